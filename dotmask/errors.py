@@ -1,0 +1,17 @@
+"""Errors that the method raises when the world is not as it must be."""
+
+
+class DotmaskError(Exception):
+    """Root of the errors that a user can mend; the message says how."""
+
+
+class TrajectoryFileError(DotmaskError):
+    """A trajectory file cannot be read: wrong columns, not finite, or times out of order."""
+
+
+class ProfileError(DotmaskError):
+    """No profile has this name."""
+
+
+class SequenceFolderError(DotmaskError):
+    """A folder in the TUM RGB-D format cannot be read or written."""

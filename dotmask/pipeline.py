@@ -1,0 +1,282 @@
+"""The paper's architecture figure on one page: segment, track, classify, mask, and close the loop with SLAM.
+
+    frame ----> segment --> observe --> predict, associate, update --> classify --> mask ---> MO-MDI, MDI
+                                              ^                                                   |
+                                              |   predicted camera pose                           v
+                                              '------------- pose feedback <----------- SLAM: odometry, map
+
+Source: Vincent et al. 2020, section III and the figure "Architecture of DOTMask".
+"""
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import Literal, Protocol
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from dotmask.classification import classify
+from dotmask.interfaces import Segmenter, SlamBackend
+from dotmask.masking import mask_depth
+from dotmask.profiles import Profile
+from dotmask.records import Detections, FloatArray, MaskedDepth, Observation, PoseEstimate, RgbdFrame, Track
+from dotmask.segmentation.selection import select_detections
+from dotmask.tracking.measurement import observe
+from dotmask.tracking.tracker import TrackerState, track_objects
+
+PoseFeedback = Literal["previous", "constant_velocity", "refined"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FrontEndResult:
+    """What a masking front end made of one frame.
+
+    Attributes:
+        detections: objects of interest, None where the front end looks for none.
+        observations: their measured positions in the camera frame.
+        tracks: beliefs after this frame, each with its verdict.
+        masked: the depth images for SLAM.
+        stage_seconds: CPU time of the calling thread by stage (segment, track, classify, mask); only stages that ran.
+    """
+
+    detections: Detections | None
+    observations: tuple[Observation, ...]
+    tracks: tuple[Track, ...]
+    masked: MaskedDepth
+    stage_seconds: dict[str, float]
+
+
+class FrontEnd(Protocol):
+    """Turns a frame into the depth images that SLAM may see."""
+
+    def step(self, frame: RgbdFrame, T_world_camera: FloatArray) -> FrontEndResult:
+        """Process the next frame, with the camera pose as known before odometry has seen it."""
+        ...
+
+    def refine(self, T_world_camera: FloatArray) -> FrontEndResult:
+        """Redo the tracking of the last frame with the pose that odometry found; the masks stay."""
+        ...
+
+
+class StageClock:
+    """Adds up the CPU time that this thread spends in named stages."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+
+    @contextmanager
+    def __call__(self, stage: str) -> Iterator[None]:
+        """Time the block as `stage`."""
+        start = time.thread_time()
+        yield
+        self.seconds[stage] = self.seconds.get(stage, 0.0) + time.thread_time() - start
+
+
+class Unmasked:
+    """The control: raw depth to odometry and to the map."""
+
+    def step(self, frame: RgbdFrame, T_world_camera: FloatArray) -> FrontEndResult:
+        """See FrontEnd."""
+        self._result = FrontEndResult(
+            detections=None,
+            observations=(),
+            tracks=(),
+            masked=MaskedDepth(mo_mdi_m=frame.depth_m, mdi_m=frame.depth_m),
+            stage_seconds={},
+        )
+        return self._result
+
+    def refine(self, T_world_camera: FloatArray) -> FrontEndResult:
+        """Nothing depends on the pose."""
+        return self._result
+
+
+class MaskAll:
+    """The MDI for everything: all objects of interest removed from odometry and map, moving or not."""
+
+    def __init__(self, segmenter: Segmenter, profile: Profile) -> None:
+        self._segmenter, self._profile = segmenter, profile
+
+    def step(self, frame: RgbdFrame, T_world_camera: FloatArray) -> FrontEndResult:
+        """See FrontEnd."""
+        clock = StageClock()
+        with clock("segment"):
+            detections = select_detections(self._segmenter.segment(frame), self._profile)
+        with clock("mask"):
+            masked = mask_depth(frame.depth_m, detections, [True] * len(detections), (), self._profile)
+        self._result = FrontEndResult(
+            detections=detections, observations=(), tracks=(), masked=masked, stage_seconds=clock.seconds
+        )
+        return self._result
+
+    def refine(self, T_world_camera: FloatArray) -> FrontEndResult:
+        """Nothing depends on the pose."""
+        return self._result
+
+
+@dataclass(slots=True)
+class _Kept:
+    """State before the last frame and what that frame brought: enough to redo its tracking."""
+
+    before: TrackerState
+    frame: RgbdFrame
+    result: FrontEndResult
+
+
+class DotMask:
+    """The method of the paper. The one object with state; a step that raises leaves the state as it was."""
+
+    def __init__(self, segmenter: Segmenter, profile: Profile) -> None:
+        self._segmenter, self._profile = segmenter, profile
+        self._state = TrackerState()
+        self._kept: _Kept | None = None
+
+    def step(self, frame: RgbdFrame, T_world_camera: FloatArray) -> FrontEndResult:
+        """Segment, track, classify and mask one frame.
+
+        Args:
+            frame: the next frame; stamps must increase.
+            T_world_camera: (4, 4) the camera pose as predicted before odometry has seen the frame.
+        """
+        clock, before = StageClock(), self._state
+        with clock("segment"):
+            detections = select_detections(self._segmenter.segment(frame), self._profile)
+        with clock("track"):
+            observations = observe(detections, frame, self._profile)
+            after = self._track(before, frame, detections, observations, T_world_camera)
+        with clock("classify"):
+            after = self._classify(before, after)
+        with clock("mask"):
+            moving = {t.detection_index for t in after.tracks if t.verdict is not None and t.verdict.is_moving}
+            seen = {t.detection_index for t in after.tracks}
+            # A detection without a track has no valid depth: nothing is known of it, so it is masked.
+            removed = [i in moving or i not in seen for i in range(len(detections))]
+            masked = mask_depth(frame.depth_m, detections, removed, after.tracks, self._profile)
+        result = FrontEndResult(
+            detections=detections,
+            observations=observations,
+            tracks=after.tracks,
+            masked=masked,
+            stage_seconds=clock.seconds,
+        )
+        self._state, self._kept = after, _Kept(before, frame, result)
+        return result
+
+    def refine(self, T_world_camera: FloatArray) -> FrontEndResult:
+        """Redo the tracking and classification of the last frame with the pose that odometry found.
+
+        The masked images were used already and stay as they are; the beliefs that the next frame starts from and the
+        reported tracks are the refined ones.
+        """
+        if self._kept is None:
+            raise ValueError("refine: no frame has been processed yet")
+        before, frame, result = self._kept.before, self._kept.frame, self._kept.result
+        assert result.detections is not None
+        clock = StageClock()
+        clock.seconds.update(result.stage_seconds)
+        with clock("track"):
+            after = self._track(before, frame, result.detections, result.observations, T_world_camera)
+        with clock("classify"):
+            after = self._classify(before, after)
+        self._state = after
+        return replace(result, tracks=after.tracks, stage_seconds=clock.seconds)
+
+    def _track(
+        self,
+        before: TrackerState,
+        frame: RgbdFrame,
+        detections: Detections,
+        observations: tuple[Observation, ...],
+        T_world_camera: FloatArray,
+    ) -> TrackerState:
+        return track_objects(before, observations, detections, frame.timestamp_s, T_world_camera, self._profile)
+
+    def _classify(self, before: TrackerState, after: TrackerState) -> TrackerState:
+        known = {t.track_id: t for t in before.tracks}
+        tracks = tuple(replace(t, verdict=classify(t, known.get(t.track_id), self._profile)) for t in after.tracks)
+        return replace(after, tracks=tracks)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FrameResult:
+    """One turn of the closed loop.
+
+    Attributes:
+        frame: what went in.
+        T_world_camera_predicted: (4, 4) the pose that the tracker was given.
+        front_end: see FrontEndResult.
+        pose: what SLAM answered.
+        stage_seconds: CPU time of the calling thread by stage (segment, track, classify, mask, odometry).
+    """
+
+    frame: RgbdFrame
+    T_world_camera_predicted: FloatArray
+    front_end: FrontEndResult
+    pose: PoseEstimate
+    stage_seconds: dict[str, float]
+
+
+class ClosedLoop:
+    """Front end and SLAM back end, with the camera pose fed back to the tracker.
+
+    The tracker needs a pose before odometry has seen the frame: the method's weak joint at high camera speed.
+    `previous` gives it the last pose (the paper's loop), `constant_velocity` extrapolates the last two, `refined`
+    starts from the extrapolation and redoes the update with odometry's answer. While SLAM is lost the last known poses
+    are used; the pose estimate says that it is lost.
+
+    Args:
+        front_end: what masks the depth.
+        slam: what follows the camera.
+        pose_feedback: see above.
+        T_world_camera_initial: (4, 4) where the first frame is taken: it fixes the world that SLAM reports in.
+    """
+
+    def __init__(
+        self, front_end: FrontEnd, slam: SlamBackend, pose_feedback: PoseFeedback, T_world_camera_initial: FloatArray
+    ) -> None:
+        self._front_end, self._slam, self._pose_feedback = front_end, slam, pose_feedback
+        self._initial = T_world_camera_initial
+        self._poses: tuple[tuple[float, FloatArray], ...] = ()
+
+    def step(self, frame: RgbdFrame) -> FrameResult:
+        """Process the next frame."""
+        predicted = self._predict_pose(frame.timestamp_s)
+        front_end = self._front_end.step(frame, predicted)
+        clock = StageClock()
+        with clock("odometry"):
+            pose = self._slam.track(frame, front_end.masked)
+        if pose.T_world_camera is not None:
+            if self._pose_feedback == "refined":
+                front_end = self._front_end.refine(pose.T_world_camera)
+            self._poses = (*self._poses[-1:], (frame.timestamp_s, pose.T_world_camera))
+        return FrameResult(
+            frame=frame,
+            T_world_camera_predicted=predicted,
+            front_end=front_end,
+            pose=pose,
+            stage_seconds={**front_end.stage_seconds, **clock.seconds},
+        )
+
+    def _predict_pose(self, timestamp_s: float) -> FloatArray:
+        if not self._poses:
+            return self._initial
+        if self._pose_feedback == "previous" or len(self._poses) < 2:
+            return self._poses[-1][1]
+        first, second = self._poses
+        return extrapolate(first, second, timestamp_s)
+
+
+def extrapolate(first: tuple[float, FloatArray], second: tuple[float, FloatArray], timestamp_s: float) -> FloatArray:
+    """Pose at `timestamp_s` of a camera that keeps its velocity between two stamped poses (seconds, (4, 4)).
+
+    The velocity of the position is kept in the world, the angular velocity in the camera.
+    """
+    (t0, T_world_0), (t1, T_world_1) = first, second
+    ratio = (timestamp_s - t1) / (t1 - t0)
+    turn = Rotation.from_matrix(T_world_0[:3, :3].T @ T_world_1[:3, :3]).as_rotvec()
+    T_world_camera = np.eye(4)
+    T_world_camera[:3, :3] = T_world_1[:3, :3] @ Rotation.from_rotvec(ratio * turn).as_matrix()
+    T_world_camera[:3, 3] = T_world_1[:3, 3] + ratio * (T_world_1[:3, 3] - T_world_0[:3, 3])
+    return T_world_camera

@@ -1,0 +1,348 @@
+"""The values that flow through the method: frozen, checked once, with shape, unit and frame.
+
+Conventions (docs/conventions.md): `T_a_b` maps points of b into a. Camera axes are OpenCV's (x right,
+y down, z forward); the world is right-handed with z up. Depth is z in metres, 0 = no return. Images are
+indexed `[v, u]` and pixel centres lie at integers.
+
+Arrays are kept as read-only views: no copy is made, and the caller's own array stays writable.
+"""
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+DepthImage = npt.NDArray[np.float32]
+ColourImage = npt.NDArray[np.uint8]
+MaskImage = npt.NDArray[np.bool_]
+
+
+def checked(array: Any, name: str, shape: tuple[int | None, ...], dtype: type) -> npt.NDArray[Any]:
+    """A read-only view of `array` after a check of its shape and type.
+
+    Args:
+        array: the array, or a nested sequence of numbers.
+        name: what to call it in the error message.
+        shape: the wanted shape; None stands for any length.
+        dtype: the wanted element type. Numbers are converted only where nothing can be lost.
+
+    Raises:
+        ValueError: the shape or the type is another one, or a float array is not finite.
+    """
+    given = np.asarray(array)
+    if given.dtype != np.dtype(dtype):
+        if given.dtype.kind not in "iufb" or not np.can_cast(given.dtype, dtype, "safe"):
+            raise ValueError(f"{name}: expected {np.dtype(dtype)}, got {given.dtype}")
+        given = given.astype(dtype)
+    matches = len(given.shape) == len(shape) and all(
+        want is None or have == want for have, want in zip(given.shape, shape, strict=True)
+    )
+    if not matches:
+        wanted = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ")"
+        raise ValueError(f"{name}: expected shape {wanted}, got {given.shape}")
+    view = given.view()
+    view.flags.writeable = False
+    return view
+
+
+def check_finite(array: npt.NDArray[Any], name: str) -> None:
+    """Raise ValueError unless every element of `array` is a finite number."""
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name}: holds a number that is not finite")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Intrinsics:
+    """Pinhole camera without distortion: `u = fx x / z + cx`, `v = fy y / z + cy` (pixels)."""
+
+    width: int
+    height: int
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+
+    def __post_init__(self) -> None:
+        """Refuse an empty image and a focal length that is not positive."""
+        if self.width < 1 or self.height < 1:
+            raise ValueError(f"intrinsics: image of {self.width} x {self.height} pixels is empty")
+        if not (self.fx > 0 and self.fy > 0):
+            raise ValueError("intrinsics: focal lengths must be positive")
+
+    @property
+    def matrix(self) -> FloatArray:
+        """The 3x3 camera matrix K (pixels)."""
+        return np.array([[self.fx, 0, self.cx], [0, self.fy, self.cy], [0, 0, 1.0]])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RgbdFrame:
+    """One image pair of the sensor, as the method sees it.
+
+    Attributes:
+        index: number of the frame, from 0.
+        timestamp_s: time stamp of both images, seconds.
+        rgb: (H, W, 3) uint8.
+        depth_m: (H, W) float32, z in metres, 0 = no return.
+        intrinsics: of both images (depth is registered to colour).
+    """
+
+    index: int
+    timestamp_s: float
+    rgb: ColourImage
+    depth_m: DepthImage
+    intrinsics: Intrinsics
+
+    def __post_init__(self) -> None:
+        """Check both images against the intrinsics."""
+        size = (self.intrinsics.height, self.intrinsics.width)
+        object.__setattr__(self, "rgb", checked(self.rgb, "rgb", (*size, 3), np.uint8))
+        object.__setattr__(self, "depth_m", checked(self.depth_m, "depth_m", size, np.float32))
+        if not np.isfinite(self.timestamp_s):
+            raise ValueError("timestamp_s: not finite")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Detections:
+    """What a segmenter found in one image: the paper's dynamic object state, N instances.
+
+    Attributes:
+        masks: (N, H, W) bool, the pixels of each instance.
+        boxes_px: (N, 4) float64, `u_min, v_min, u_max, v_max`, the outermost pixel centres (inclusive).
+        class_names: N COCO class names.
+        scores: (N,) float64 in 0..1.
+    """
+
+    masks: npt.NDArray[np.bool_]
+    boxes_px: FloatArray
+    class_names: tuple[str, ...]
+    scores: FloatArray
+
+    def __post_init__(self) -> None:
+        """Check that all columns speak of the same number of instances."""
+        count = len(self.class_names)
+        object.__setattr__(self, "masks", checked(self.masks, "masks", (count, None, None), np.bool_))
+        object.__setattr__(self, "boxes_px", checked(self.boxes_px, "boxes_px", (count, 4), np.float64))
+        object.__setattr__(self, "scores", checked(self.scores, "scores", (count,), np.float64))
+        check_finite(self.boxes_px, "boxes_px")
+        check_finite(self.scores, "scores")
+
+    def __len__(self) -> int:
+        """The number of instances."""
+        return len(self.class_names)
+
+    def select(self, indices: npt.ArrayLike) -> "Detections":
+        """The instances `indices`, in that order."""
+        chosen = np.asarray(indices, dtype=np.intp)
+        return Detections(
+            masks=self.masks[chosen],
+            boxes_px=self.boxes_px[chosen],
+            class_names=tuple(self.class_names[i] for i in chosen),
+            scores=self.scores[chosen],
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Observation:
+    """Position of one detected object as measured in the camera frame.
+
+    Attributes:
+        position_camera: (3,) z of the paper, metres, camera frame.
+        covariance: (3, 3) R of the paper, square metres, camera frame.
+        class_name: COCO class name.
+        detection_index: which of the frame's detections this is.
+        is_partial: whether something nearer, or the image border, hides a side of it.
+    """
+
+    position_camera: FloatArray
+    covariance: FloatArray
+    class_name: str
+    detection_index: int
+    is_partial: bool = False
+
+    def __post_init__(self) -> None:
+        """Check shapes and that the numbers are finite."""
+        for name, shape in (("position_camera", (3,)), ("covariance", (3, 3))):
+            object.__setattr__(self, name, checked(getattr(self, name), name, shape, np.float64))
+            check_finite(getattr(self, name), name)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Innovation:
+    """What an update learned: `y = z - h(x)` and its covariance S (camera frame, metres).
+
+    Attributes:
+        residual: (3,) y.
+        covariance: (3, 3) S.
+    """
+
+    residual: FloatArray
+    covariance: FloatArray
+
+    @property
+    def nis(self) -> float:
+        """Normalised innovation squared `yᵀ S⁻¹ y`; chi-square with 3 degrees of freedom if consistent."""
+        return float(self.residual @ np.linalg.solve(self.covariance, self.residual))
+
+
+class Reason(Enum):
+    """Why the moving object classification (MOC) answered as it did."""
+
+    SPEED = "speed"
+    DEFORMATION = "deformation"
+    NEW = "new"
+    IDLE = "idle"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Verdict:
+    """Answer of the moving object classification for one track in one frame.
+
+    Attributes:
+        is_moving: whether the object is removed from the odometry depth (MO-MDI).
+        reason: what decided.
+        speed_m_s: norm of the estimated velocity.
+        mask_iou: IoU of the two last masks, aligned as the profile says; None with fewer than two masks.
+        calm_frames: consecutive frames whose evidence said idle, for the hysteresis.
+    """
+
+    is_moving: bool
+    reason: Reason
+    speed_m_s: float
+    mask_iou: float | None
+    calm_frames: int = 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Track:
+    """Belief about one object after the last processed frame.
+
+    Attributes:
+        track_id: never used again after the track ends.
+        class_name: COCO class name.
+        timestamp_s: time of the belief, seconds.
+        mean: (6,) position and velocity in the world, metres and metres per second.
+        covariance: (6, 6) P.
+        age_frames: frames since birth; 1 in the frame of birth.
+        misses: consecutive frames without an observation; 0 = seen in this frame.
+        detection_index: the detection of this frame that it was updated with; None when not seen.
+        mask: (H, W) bool, the last mask seen.
+        mask_timestamp_s: when it was seen.
+        partial_timestamp_s: when something last hid a part of it, or when it was first seen.
+        innovation: of this frame's update; None at birth and when not seen.
+        verdict: moving or idle; None until the classification has run.
+    """
+
+    track_id: int
+    class_name: str
+    timestamp_s: float
+    mean: FloatArray
+    covariance: FloatArray
+    age_frames: int
+    misses: int
+    detection_index: int | None
+    mask: MaskImage
+    mask_timestamp_s: float
+    partial_timestamp_s: float
+    innovation: Innovation | None = None
+    verdict: Verdict | None = None
+
+    def __post_init__(self) -> None:
+        """Check shapes and that the belief is finite."""
+        for name, shape in (("mean", (6,)), ("covariance", (6, 6))):
+            object.__setattr__(self, name, checked(getattr(self, name), name, shape, np.float64))
+            check_finite(getattr(self, name), name)
+        object.__setattr__(self, "mask", checked(self.mask, "mask", (None, None), np.bool_))
+
+    @property
+    def position_world(self) -> FloatArray:
+        """(3,) metres."""
+        return self.mean[:3]
+
+    @property
+    def velocity_world(self) -> FloatArray:
+        """(3,) metres per second."""
+        return self.mean[3:]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MaskedDepth:
+    """The two depth images that the SLAM back end is given, metres, 0 = no return or masked.
+
+    Attributes:
+        mo_mdi_m: (H, W) float32, moving objects removed: for odometry.
+        mdi_m: (H, W) float32, all objects of interest removed: for mapping and loop closure.
+    """
+
+    mo_mdi_m: DepthImage
+    mdi_m: DepthImage
+
+    def __post_init__(self) -> None:
+        """Check that both are depth images of one size."""
+        object.__setattr__(self, "mo_mdi_m", checked(self.mo_mdi_m, "mo_mdi_m", (None, None), np.float32))
+        object.__setattr__(self, "mdi_m", checked(self.mdi_m, "mdi_m", self.mo_mdi_m.shape, np.float32))
+
+
+class SlamStatus(Enum):
+    """State of the SLAM back end after a frame."""
+
+    INITIALISING = "initialising"
+    TRACKED = "tracked"
+    LOST = "lost"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PoseEstimate:
+    """Answer of the SLAM back end for one frame.
+
+    Attributes:
+        timestamp_s: of the frame, seconds.
+        T_world_camera: (4, 4) the estimated pose, or None when lost: no pose is ever made up.
+        status: see SlamStatus.
+        inliers: features that agree with the pose.
+    """
+
+    timestamp_s: float
+    T_world_camera: FloatArray | None
+    status: SlamStatus
+    inliers: int
+
+    def __post_init__(self) -> None:
+        """Check that there is a pose unless lost."""
+        if (self.T_world_camera is None) != (self.status is SlamStatus.LOST):
+            raise ValueError("a pose estimate has a pose exactly when it is not lost")
+        if self.T_world_camera is not None:
+            pose = checked(self.T_world_camera, "T_world_camera", (4, 4), np.float64)
+            check_finite(pose, "T_world_camera")
+            object.__setattr__(self, "T_world_camera", pose)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Trajectory:
+    """Camera poses over time.
+
+    Attributes:
+        timestamps_s: (N,) strictly increasing, seconds.
+        T_world_camera: (N, 4, 4).
+    """
+
+    timestamps_s: FloatArray
+    T_world_camera: FloatArray
+
+    def __post_init__(self) -> None:
+        """Check lengths, finiteness and the order of the times."""
+        times = checked(self.timestamps_s, "timestamps_s", (None,), np.float64)
+        poses = checked(self.T_world_camera, "T_world_camera", (len(times), 4, 4), np.float64)
+        check_finite(times, "timestamps_s")
+        check_finite(poses, "T_world_camera")
+        if len(times) > 1 and not (np.diff(times) > 0).all():
+            raise ValueError("timestamps_s: not strictly increasing")
+        object.__setattr__(self, "timestamps_s", times)
+        object.__setattr__(self, "T_world_camera", poses)
+
+    def __len__(self) -> int:
+        """The number of poses."""
+        return len(self.timestamps_s)

@@ -1,0 +1,20 @@
+"""Which detections go on into the method."""
+
+from dotmask.profiles import Profile
+from dotmask.records import Detections
+
+
+def select_detections(detections: Detections, profile: Profile) -> Detections:
+    """The objects of interest with a score of at least the threshold, at most m of them, best first.
+
+    Equal scores are ordered by their boxes, so the answer does not depend on the order in which a segmenter lists its
+    detections. Source: paper, Experimental Setup (p and m).
+    """
+    names = {model.name for model in profile.classes}
+    scores = detections.scores
+    wanted = [
+        i for i, name in enumerate(detections.class_names) if name in names and scores[i] >= profile.score_threshold
+    ]
+    best = sorted(wanted, key=lambda i: (-scores[i], *detections.boxes_px[i], detections.class_names[i]))
+    best = best[: profile.max_observations]
+    return detections if best == list(range(len(detections))) else detections.select(best)

@@ -1,0 +1,1 @@
+"""SLAM back ends behind the SlamBackend interface."""

@@ -1,0 +1,99 @@
+"""The embedded SLAM back end: RGB-D odometry and keyframes on OpenCV and NumPy."""
+
+import cv2
+import numpy as np
+
+from dotmask.records import (
+    FloatArray,
+    Intrinsics,
+    MaskedDepth,
+    PoseEstimate,
+    RgbdFrame,
+    SlamStatus,
+    check_finite,
+    checked,
+)
+from dotmask.slam.features import FeatureExtractor
+from dotmask.slam.keyframes import Keyframe, KeyframeStore
+from dotmask.slam.odometry import Odometry
+from dotmask.slam.settings import OdometrySettings
+
+_DEFAULT_SETTINGS = OdometrySettings()
+
+
+class EmbeddedSlam:
+    """A `SlamBackend` that needs no other program and gives the same poses, bit for bit, in every run.
+
+    Odometry uses corners with depth in MO-MDI. Keyframes hold corners with depth in MDI; they are what loop closure
+    and the pose graph work on. The poses that `track` returns are those of odometry.
+
+    Args:
+        intrinsics: of all frames.
+        initial_T_world_camera: (4, 4) pose of the camera at the first frame; it ties the map to the world.
+        settings: parameters.
+
+    Raises:
+        ValueError: the initial pose is not a finite 4x4 matrix.
+    """
+
+    def __init__(
+        self,
+        intrinsics: Intrinsics,
+        initial_T_world_camera: FloatArray,
+        settings: OdometrySettings = _DEFAULT_SETTINGS,
+    ) -> None:
+        start = checked(initial_T_world_camera, "initial_T_world_camera", (4, 4), np.float64)
+        check_finite(start, "initial_T_world_camera")
+        self._camera, self._settings = intrinsics, settings
+        self._extractor = FeatureExtractor(intrinsics, settings)
+        self._odometry = Odometry(intrinsics, start, settings)
+        self._store = KeyframeStore(intrinsics, settings)
+        self._started = False
+        self._last_time_s: float | None = None
+
+    @property
+    def keyframes(self) -> tuple[Keyframe, ...]:
+        """The keyframes in the order of time, at most `settings.max_keyframes` (about 50 kB each)."""
+        return self._store.keyframes
+
+    def track(self, frame: RgbdFrame, masked: MaskedDepth) -> PoseEstimate:
+        """Pose of the camera at `frame`.
+
+        The status is `INITIALISING` with the initial pose on the first frame that has enough features, `TRACKED` when
+        a pose was found, and else `LOST` without a pose; the next frame is then tried from the last pose found.
+
+        Raises:
+            ValueError: the frame has other intrinsics, the masked depth another size, or the time does not rise.
+        """
+        self._check(frame, masked)
+        self._last_time_s = frame.timestamp_s
+        grey = np.asarray(cv2.cvtColor(frame.rgb, cv2.COLOR_RGB2GRAY), dtype=np.uint8)
+        features = self._extractor.extract(grey, masked.mo_mdi_m)
+        if self._started:
+            result = self._odometry.track(features, frame.timestamp_s)
+            status = SlamStatus.TRACKED
+        else:
+            self._started = len(features) >= self._settings.min_inliers
+            result = self._odometry.start(features, frame.timestamp_s) if self._started else None
+            status = SlamStatus.INITIALISING
+        if result is None:
+            return PoseEstimate(timestamp_s=frame.timestamp_s, T_world_camera=None, status=SlamStatus.LOST, inliers=0)
+        if self._store.is_due(result.T_world_camera):
+            # Where both depths are masked alike, odometry has found the corners already.
+            if not np.array_equal(masked.mdi_m, masked.mo_mdi_m):
+                features = self._extractor.extract(grey, masked.mdi_m)
+            self._store.add(frame.index, frame.timestamp_s, result.T_world_camera, features)
+        return PoseEstimate(
+            timestamp_s=frame.timestamp_s,
+            T_world_camera=result.T_world_camera,
+            status=status,
+            inliers=result.inliers,
+        )
+
+    def _check(self, frame: RgbdFrame, masked: MaskedDepth) -> None:
+        if frame.intrinsics != self._camera:
+            raise ValueError(f"frame {frame.index}: its intrinsics are not those the back end was made for")
+        if masked.mo_mdi_m.shape != frame.depth_m.shape:
+            raise ValueError(f"frame {frame.index}: masked depth of {masked.mo_mdi_m.shape}, not {frame.depth_m.shape}")
+        if self._last_time_s is not None and frame.timestamp_s <= self._last_time_s:
+            raise ValueError(f"frame {frame.index}: time {frame.timestamp_s} is not after {self._last_time_s}")

@@ -1,0 +1,88 @@
+"""Keyframes: what is kept of chosen frames for loop closure and the pose graph."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial.transform import Rotation
+
+from dotmask.geometry import back_project, inverse
+from dotmask.records import FloatArray, Intrinsics
+from dotmask.slam.features import Descriptors, Features
+from dotmask.slam.settings import OdometrySettings
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Keyframe:
+    """A frame of the map. Images are not kept, so that memory does not grow with the image size.
+
+    Attributes:
+        frame_index: index of the frame.
+        timestamp_s: its time, seconds.
+        T_world_camera: (4, 4) pose by odometry.
+        pixels: (N, 2) float32, corners where the mapping depth (MDI) is valid.
+        p_camera: (N, 3) float32, their positions in the camera frame, metres.
+        descriptors: (N, 32) uint8.
+    """
+
+    frame_index: int
+    timestamp_s: float
+    T_world_camera: FloatArray
+    pixels: npt.NDArray[np.float32]
+    p_camera: npt.NDArray[np.float32]
+    descriptors: Descriptors
+
+
+class KeyframeStore:
+    """The keyframes in the order of time, at most `settings.max_keyframes`.
+
+    Args:
+        intrinsics: of the camera.
+        settings: when a keyframe is due, and how many are kept.
+    """
+
+    def __init__(self, intrinsics: Intrinsics, settings: OdometrySettings) -> None:
+        self._camera, self._settings = intrinsics, settings
+        self._keyframes: list[Keyframe] = []
+
+    @property
+    def keyframes(self) -> tuple[Keyframe, ...]:
+        """All that are kept."""
+        return tuple(self._keyframes)
+
+    def is_due(self, T_world_camera: FloatArray) -> bool:
+        """Whether the camera has moved or turned enough since the last keyframe."""
+        if not self._keyframes:
+            return True
+        distance_m, angle_rad = _motion(self._keyframes[-1].T_world_camera, T_world_camera)
+        return distance_m >= self._settings.keyframe_distance_m or angle_rad >= self._settings.keyframe_angle_rad
+
+    def add(self, frame_index: int, timestamp_s: float, T_world_camera: FloatArray, features: Features) -> None:
+        """Append a keyframe; beyond the bound, the one whose neighbours are nearest to each other is dropped."""
+        self._keyframes.append(
+            Keyframe(
+                frame_index=frame_index,
+                timestamp_s=timestamp_s,
+                T_world_camera=T_world_camera,
+                pixels=features.pixels.astype(np.float32),
+                p_camera=back_project(features.pixels, features.depth_m, self._camera).astype(np.float32),
+                descriptors=features.descriptors,
+            )
+        )
+        if len(self._keyframes) > self._settings.max_keyframes:
+            del self._keyframes[self._most_redundant()]
+
+    def _most_redundant(self) -> int:
+        """Index of the keyframe whose removal leaves the smallest gap; never the first or the last."""
+        gaps = []
+        for before, after in zip(self._keyframes[:-2], self._keyframes[2:], strict=True):
+            distance_m, angle_rad = _motion(before.T_world_camera, after.T_world_camera)
+            s = self._settings
+            gaps.append(distance_m / s.keyframe_distance_m + angle_rad / s.keyframe_angle_rad)
+        return int(np.argmin(gaps)) + 1
+
+
+def _motion(T_world_a: FloatArray, T_world_b: FloatArray) -> tuple[float, float]:
+    """Distance in metres and angle in radians between two poses."""
+    T_a_b = inverse(T_world_a) @ T_world_b
+    return float(np.linalg.norm(T_a_b[:3, 3])), float(Rotation.from_matrix(T_a_b[:3, :3]).magnitude())

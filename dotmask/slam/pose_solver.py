@@ -1,0 +1,159 @@
+"""Camera pose from matched map points: PnP RANSAC, then robust least squares on pixels and depth."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial.transform import Rotation
+
+from dotmask.geometry import transform
+from dotmask.records import FloatArray, Intrinsics
+from dotmask.slam.settings import REFERENCE_WIDTH_PX, OdometrySettings
+
+RANSAC_ITERATIONS = 300
+RANSAC_CONFIDENCE = 0.9999
+REFINEMENTS = 3
+GAUSS_NEWTON_STEPS = 6
+CONVERGED = 1e-6
+"""Last increment of a refinement, radians and metres."""
+NEAREST_M = 0.05
+"""Points nearer than this to the image plane are not projected."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Solution:
+    """Pose and what supports it.
+
+    Attributes:
+        T_camera_world: (4, 4).
+        inliers: (K,) indices into the matches.
+    """
+
+    T_camera_world: FloatArray
+    inliers: npt.NDArray[np.intp]
+
+
+class PoseSolver:
+    """Solves for the pose of a calibrated RGB-D camera.
+
+    Args:
+        intrinsics: of the camera.
+        settings: thresholds; those in pixels are scaled to the image width.
+    """
+
+    def __init__(self, intrinsics: Intrinsics, settings: OdometrySettings) -> None:
+        self._camera, self._settings = intrinsics, settings
+        self._scale = intrinsics.width / REFERENCE_WIDTH_PX
+
+    def depth_sigma(self, depth_m: FloatArray) -> FloatArray:
+        """Standard deviation of a measured depth, metres."""
+        s = self._settings
+        return np.asarray(s.depth_sigma_floor_m + s.depth_sigma_growth_per_m * depth_m**2)
+
+    def solve(self, p_world: FloatArray, pixels: FloatArray, depth_m: FloatArray) -> Solution | None:
+        """The pose that most matches agree with, or None when too few do.
+
+        Minimal sets by AP3P (Ke & Roumeliotis, CVPR 2017) in OpenCV's RANSAC, whose random numbers start from the
+        same state in every call. Then the pose is refined on the inliers, and the inliers are chosen again among
+        all matches.
+
+        Args:
+            p_world: (N, 3) matched map points.
+            pixels: (N, 2) where they are seen.
+            depth_m: (N,) the depth measured there.
+        """
+        s = self._settings
+        if len(p_world) < s.min_inliers:
+            return None
+        found, rotation, translation, chosen = cv2.solvePnPRansac(
+            p_world,
+            pixels,
+            self._camera.matrix,
+            None,
+            iterationsCount=RANSAC_ITERATIONS,
+            reprojectionError=s.ransac_px * self._scale,
+            confidence=RANSAC_CONFIDENCE,
+            flags=cv2.SOLVEPNP_AP3P,
+        )
+        if not found or chosen is None or len(chosen) < s.min_inliers // 2:
+            return None
+        T_camera_world = np.eye(4)
+        T_camera_world[:3, :3] = Rotation.from_rotvec(rotation[:, 0]).as_matrix()
+        T_camera_world[:3, 3] = translation[:, 0]
+        inliers = chosen[:, 0].astype(np.intp)
+        for _ in range(REFINEMENTS):
+            if not np.isfinite(T_camera_world).all() or len(inliers) < s.min_inliers // 2:
+                return None
+            T_camera_world = self.refine(T_camera_world, p_world[inliers], pixels[inliers], depth_m[inliers])
+            again = self._agreeing(T_camera_world, p_world, pixels, depth_m)
+            settled = np.array_equal(again, inliers)
+            inliers = again
+            if settled:
+                break
+        if len(inliers) < s.min_inliers:
+            return None
+        return Solution(T_camera_world=T_camera_world, inliers=inliers)
+
+    def refine(
+        self, T_camera_world: FloatArray, p_world: FloatArray, pixels: FloatArray, depth_m: FloatArray
+    ) -> FloatArray:
+        """Gauss-Newton on the pose alone with Huber weights, from the start `T_camera_world`.
+
+        Residuals: `u` and `v` in pixels of the reference width (one common weight), and depth in standard deviations.
+        The increment is a twist (rotation w, translation t) from the left: with `Y = T X`, `dY = w x Y + t`. So for a
+        residual with gradient g over Y, the derivative is g over t and `Y x g` over w.
+        """
+        camera, delta = self._camera, self._settings.huber
+        inverse_sigma = 1.0 / self.depth_sigma(depth_m)
+        fx, fy = camera.fx / self._scale, camera.fy / self._scale
+        seen_x, seen_y = (pixels[:, 0] - camera.cx) / self._scale, (pixels[:, 1] - camera.cy) / self._scale
+        zero = np.zeros_like(depth_m)
+        T = T_camera_world
+        for _ in range(GAUSS_NEWTON_STEPS):
+            x, y, z = transform(T, p_world).T
+            inverse_z = 1.0 / np.maximum(z, NEAREST_M)
+            a, b = fx * inverse_z, fy * inverse_z
+            r_u, r_v, r_z = a * x - seen_x, b * y - seen_y, (z - depth_m) * inverse_sigma
+            # Rows of the Jacobian: derivative over (w, t). Huber: weight 1 inside the threshold, threshold/|r| outside.
+            pixel_weight = delta / np.maximum(np.hypot(r_u, r_v), delta)
+            depth_weight = delta / np.maximum(np.abs(r_z), delta)
+            g_u, g_v, g_z = -a * x * inverse_z, -b * y * inverse_z, inverse_sigma
+            J = np.concatenate(
+                [
+                    np.stack([y * g_u, z * a - x * g_u, -y * a, a, zero, g_u], axis=1),
+                    np.stack([y * g_v - z * b, -x * g_v, x * b, zero, b, g_v], axis=1),
+                    np.stack([y * g_z, -x * g_z, zero, zero, zero, g_z], axis=1),
+                ]
+            )
+            weight = np.concatenate([pixel_weight, pixel_weight, depth_weight])
+            residual = np.concatenate([r_u, r_v, r_z])
+            # einsum of two operands sums in a fixed order; a BLAS product may not, for another number of threads.
+            weighted = J * weight[:, None]
+            hessian = np.einsum("ni,nj->ij", weighted, J)
+            gradient = np.einsum("ni,n->i", weighted, residual)
+            step = -np.linalg.solve(hessian + 1e-9 * np.trace(hessian) * np.eye(6), gradient)
+            T = _increment(step) @ T
+            if np.abs(step).max() < CONVERGED:
+                break
+        return T
+
+    def _agreeing(
+        self, T_camera_world: FloatArray, p_world: FloatArray, pixels: FloatArray, depth_m: FloatArray
+    ) -> npt.NDArray[np.intp]:
+        """Indices of the matches that agree with the pose in the image and in depth."""
+        s, camera = self._settings, self._camera
+        x, y, z = transform(T_camera_world, p_world).T
+        safe_z = np.maximum(z, NEAREST_M)
+        error_px = np.hypot(
+            camera.fx * x / safe_z + camera.cx - pixels[:, 0], camera.fy * y / safe_z + camera.cy - pixels[:, 1]
+        )
+        in_image = (error_px < s.inlier_px * self._scale) & (z > NEAREST_M)
+        return np.flatnonzero(in_image & (np.abs(z - depth_m) < s.inlier_sigmas * self.depth_sigma(depth_m)))
+
+
+def _increment(twist: FloatArray) -> FloatArray:
+    T = np.eye(4)
+    T[:3, :3] = Rotation.from_rotvec(twist[:3]).as_matrix()
+    T[:3, 3] = twist[3:]
+    return T

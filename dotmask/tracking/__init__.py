@@ -1,0 +1,1 @@
+"""Object tracking: motion model, measurement, extended Kalman filter, association, track life."""

@@ -1,0 +1,77 @@
+"""Which observation belongs to which track. The paper does not say; this is gated global nearest neighbour."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+from scipy.special import gammaincinv
+
+from dotmask.geometry import inverse, transform
+from dotmask.profiles import Profile
+from dotmask.records import FloatArray, Observation, Track
+
+_FORBIDDEN = 1e9
+"""Above any gated distance: the assignment first pairs as many as it can, then at the least sum of distances."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Association:
+    """Answer of `associate`, as indices into its arguments, each ascending.
+
+    Attributes:
+        pairs: (track, observation).
+        unmatched_tracks: tracks without an observation.
+        unmatched_observations: observations without a track.
+    """
+
+    pairs: tuple[tuple[int, int], ...]
+    unmatched_tracks: tuple[int, ...]
+    unmatched_observations: tuple[int, ...]
+
+
+@cache
+def chi_square_quantile(probability: float, degrees: int) -> float:
+    """The value that a chi-square variable stays below with `probability`."""
+    return float(2.0 * gammaincinv(0.5 * degrees, probability))
+
+
+def squared_mahalanobis(
+    tracks: Sequence[Track], observations: Sequence[Observation], T_world_camera: FloatArray
+) -> FloatArray:
+    """(T, O) `yᵀ S⁻¹ y` of every pair, for tracks predicted to the frame of the observations."""
+    T_camera_world = inverse(T_world_camera)
+    R_camera_world = T_camera_world[:3, :3]
+    expected = transform(T_camera_world, np.array([t.position_world for t in tracks]))
+    P = R_camera_world @ np.array([t.covariance[:3, :3] for t in tracks]) @ R_camera_world.T
+    y = np.array([o.position_camera for o in observations])[None] - expected[:, None]
+    S = P[:, None] + np.array([o.covariance for o in observations])[None]
+    return np.asarray((y * np.linalg.solve(S, y[..., None])[..., 0]).sum(-1))
+
+
+def associate(
+    tracks: Sequence[Track], observations: Sequence[Observation], T_world_camera: FloatArray, profile: Profile
+) -> Association:
+    """Pair predicted tracks with observations of the same class inside the gate, at the least total distance.
+
+    Args:
+        tracks: predicted to the time of the frame.
+        observations: of that frame.
+        T_world_camera: (4, 4) the frame's camera pose.
+        profile: gives the gate.
+    """
+    pairs: tuple[tuple[int, int], ...] = ()
+    if tracks and observations:
+        cost = squared_mahalanobis(tracks, observations, T_world_camera)
+        is_same_class = np.array([[t.class_name == o.class_name for o in observations] for t in tracks])
+        is_allowed = is_same_class & (cost <= chi_square_quantile(profile.gate_probability, 3))
+        rows, columns = linear_sum_assignment(np.where(is_allowed, cost, _FORBIDDEN))
+        pairs = tuple((int(i), int(j)) for i, j in zip(rows, columns, strict=True) if is_allowed[i, j])
+    seen_tracks = {i for i, _ in pairs}
+    seen_observations = {j for _, j in pairs}
+    return Association(
+        pairs=pairs,
+        unmatched_tracks=tuple(i for i in range(len(tracks)) if i not in seen_tracks),
+        unmatched_observations=tuple(j for j in range(len(observations)) if j not in seen_observations),
+    )

@@ -1,0 +1,227 @@
+"""From detections and depth to positions in the camera frame: z and R of the paper (Tracking Using EKF, Update)."""
+
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from dotmask.profiles import ClassModel, MeasurementNoise, Profile
+from dotmask.records import DepthImage, Detections, FloatArray, Intrinsics, MaskImage, Observation, RgbdFrame
+
+_BAND_PX = 8
+"""How far outside a box an occluder is looked for: past the ring without depth that sensors leave at depth edges."""
+_RIM_PX = 3
+"""Mask pixels this close to a side of the box are what that side rests on."""
+_LINES = 64
+"""At most this many lines across a side are looked at."""
+_MEDIAN_PIXELS = 3000
+_LEAST_DEPTH_M, _MOST_DEPTH_M = 1e-6, 1e6
+_OTHER_MARGIN_M = 0.02
+"""How much nearer another detection must be to count as an occluder."""
+_LEAST_MISSING = 0.1
+"""A hidden side always widens R by at least this share of the object's extent."""
+
+
+class _Crop(NamedTuple):
+    """Whole pixels of a detection's box, clipped to the image; the stops are exclusive."""
+
+    u_start: int
+    u_stop: int
+    v_start: int
+    v_stop: int
+
+    @property
+    def slices(self) -> tuple[slice, slice]:
+        return slice(self.v_start, self.v_stop), slice(self.u_start, self.u_stop)
+
+
+def observe(detections: Detections, frame: RgbdFrame, profile: Profile) -> tuple[Observation, ...]:
+    """Camera-frame positions of the detections of `frame`.
+
+    `z_z` is the mean depth of the mask's pixels with depth, `z_x = (u - cx) z_z / fx` and `z_y` alike, with (u, v) the
+    centre of the bounding box (paper). R follows from the sensor's noise and, where the profile says so, from how the
+    shape of the class changes and from sides of the object that are not seen. A detection with fewer than
+    `profile.min_depth_pixels` pixels of valid depth gives no observation.
+    """
+    observations = []
+    labels = _label(detections, frame.intrinsics) if profile.noise.inflates_hidden_sides else None
+    for index, class_name in enumerate(detections.class_names):
+        box = detections.boxes_px[index]
+        crop = _crop(box, frame.intrinsics)
+        mask = detections.masks[index]
+        depth = _mean_depth(mask[crop.slices], frame.depth_m[crop.slices], profile)
+        if depth is None:
+            continue
+        model = profile.class_model(class_name)
+        missing = (0.0, 0.0)
+        if labels is not None:
+            view = _View(index + 1, labels, frame.depth_m, profile.noise.occluder_margin_m + 0.02 * depth**2)
+            missing = _missing_extent(view, box, crop, depth, model, frame.intrinsics)
+        observations.append(
+            Observation(
+                position_camera=_back_project_centre(box, depth, frame.intrinsics),
+                covariance=measurement_covariance(box, depth, missing, model, frame.intrinsics, profile.noise),
+                class_name=class_name,
+                detection_index=index,
+                is_partial=missing != (0.0, 0.0),
+            )
+        )
+    return tuple(observations)
+
+
+def measurement_covariance(
+    box_px: FloatArray,
+    depth_m: float,
+    missing_m: tuple[float, float],
+    model: ClassModel,
+    intrinsics: Intrinsics,
+    noise: MeasurementNoise,
+) -> FloatArray:
+    """R (3, 3), square metres, camera frame.
+
+    Args:
+        box_px: `u_min, v_min, u_max, v_max`.
+        depth_m: measured depth.
+        missing_m: width and height of what a hidden side may hide; 0 where the object ends by itself.
+        model: how much the shape of the class changes, and its extent.
+        intrinsics: of the camera.
+        noise: see MeasurementNoise.
+    """
+    sigma_z = noise.depth_sigma_m + noise.depth_sigma_per_m * (depth_m - 0.4) ** 2
+    sigmas = np.array([noise.pixel_sigma_px, noise.pixel_sigma_px, sigma_z])
+    # Jacobian of the back-projection (u, v, z) -> (x, y, z).
+    J = np.diag([depth_m / intrinsics.fx, depth_m / intrinsics.fy, 1.0])
+    if not noise.is_diagonal:
+        J[:, 2] = _back_project_centre(box_px, 1.0, intrinsics)
+    scaled = J * sigmas
+    R: FloatArray = scaled @ scaled.T
+    # The centre of what is seen lies half of what is hidden away from the centre of the whole.
+    share = max((m / e for m, e in zip(missing_m, model.extent_m, strict=False) if e > 0), default=0.0)
+    offsets = (0.5 * missing_m[0], 0.5 * missing_m[1], noise.hidden_depth_share * share * model.extent_m[2])
+    hidden = [model.hidden_factor * offset for offset in offsets]
+    turned = noise.pose_rotation_sigma_rad * depth_m
+    for axis, sigma_turned in enumerate((turned, turned, 0.0)):
+        R[axis, axis] += (
+            model.shape_sigma_m[axis] ** 2 + hidden[axis] ** 2 + noise.pose_position_sigma_m**2 + sigma_turned**2
+        )
+    return R
+
+
+def _back_project_centre(box_px: FloatArray, depth_m: float, intrinsics: Intrinsics) -> FloatArray:
+    u, v = 0.5 * (box_px[0] + box_px[2]), 0.5 * (box_px[1] + box_px[3])
+    x = (u - intrinsics.cx) * depth_m / intrinsics.fx
+    y = (v - intrinsics.cy) * depth_m / intrinsics.fy
+    return np.array([x, y, depth_m])
+
+
+def _crop(box_px: FloatArray, intrinsics: Intrinsics) -> _Crop:
+    u_min, v_min, u_max, v_max = (float(x) for x in box_px)
+    return _Crop(
+        u_start=max(int(np.floor(u_min)), 0),
+        u_stop=min(int(np.ceil(u_max)) + 1, intrinsics.width),
+        v_start=max(int(np.floor(v_min)), 0),
+        v_stop=min(int(np.ceil(v_max)) + 1, intrinsics.height),
+    )
+
+
+def _mean_depth(mask: MaskImage, depth_m: DepthImage, profile: Profile) -> float | None:
+    """Mean of the depths under the mask, without what is far from their median; None with too few pixels."""
+    nearest, farthest = _LEAST_DEPTH_M, _MOST_DEPTH_M
+    if profile.depth_trim_m is not None:
+        # A grid of pixels is enough: the median only has to lie on the object.
+        step = max(1, int(np.sqrt(mask.size / _MEDIAN_PIXELS)))
+        depths = depth_m[::step, ::step][mask[::step, ::step]]
+        depths = depths[depths > 0]
+        if len(depths):
+            median = float(np.partition(depths, len(depths) // 2)[len(depths) // 2])
+            nearest, farthest = max(median - profile.depth_trim_m, _LEAST_DEPTH_M), median + profile.depth_trim_m
+    is_used = cv2.bitwise_and(cv2.inRange(depth_m, nearest, farthest), mask.view(np.uint8))
+    if cv2.countNonZero(is_used) < profile.min_depth_pixels:
+        return None
+    return float(cv2.mean(depth_m, is_used)[0])
+
+
+class _View(NamedTuple):
+    """What the search for hidden sides looks at.
+
+    Attributes:
+        label: of the detection.
+        labels: (H, W) uint8, 0 where no detection is.
+        depth_m: (H, W).
+        margin_m: how much nearer than the object something unlabelled must be to count as an occluder and not as the
+            floor before its feet.
+    """
+
+    label: int
+    labels: npt.NDArray[np.uint8]
+    depth_m: DepthImage
+    margin_m: float
+
+
+def _label(detections: Detections, intrinsics: Intrinsics) -> npt.NDArray[np.uint8]:
+    """(H, W) number of the detection, from 1, that each pixel belongs to; the last where masks overlap."""
+    if len(detections) > 255:
+        raise ValueError(f"observe: {len(detections)} detections, at most 255 are supported")
+    labels = np.zeros((intrinsics.height, intrinsics.width), np.uint8)
+    for index, mask in enumerate(detections.masks):
+        region = _crop(detections.boxes_px[index], intrinsics).slices
+        np.copyto(labels[region], np.uint8(index + 1), where=mask[region])
+    return labels
+
+
+def _missing_extent(
+    view: _View, box_px: FloatArray, crop: _Crop, distance_m: float, model: ClassModel, intrinsics: Intrinsics
+) -> tuple[float, float]:
+    """Width and height (m) that hidden sides may hide: the class's extent less what is seen; 0 where none is hidden."""
+    u0, u1, v0, v1 = crop
+    rows, columns = slice(v0, v1, 1 + (v1 - v0) // _LINES), slice(u0, u1, 1 + (u1 - u0) // _LINES)
+    low_u, high_u = slice(max(u0 - _BAND_PX, 0), u0 + _RIM_PX), slice(max(u1 - _RIM_PX, 0), u1 + _BAND_PX)
+    low_v, high_v = slice(max(v0 - _BAND_PX, 0), v0 + _RIM_PX), slice(max(v1 - _RIM_PX, 0), v1 + _BAND_PX)
+    is_hidden_u = (
+        u0 <= 1
+        or u1 >= intrinsics.width - 1
+        or _ends_behind_occluder(view, (rows, low_u), across_columns=True, is_high=False)
+        or _ends_behind_occluder(view, (rows, high_u), across_columns=True, is_high=True)
+    )
+    is_hidden_v = (
+        v0 <= 1
+        or v1 >= intrinsics.height - 1
+        or _ends_behind_occluder(view, (low_v, columns), across_columns=False, is_high=False)
+        or _ends_behind_occluder(view, (high_v, columns), across_columns=False, is_high=True)
+    )
+    seen = (
+        float(box_px[2] - box_px[0] + 1) * distance_m / intrinsics.fx,
+        float(box_px[3] - box_px[1] + 1) * distance_m / intrinsics.fy,
+    )
+    if not (is_hidden_u or is_hidden_v):
+        return 0.0, 0.0
+    # What hides the left of a person may hide the head as well, though the box ends at the shoulder by itself.
+    width, height = (
+        max(extent - s, _LEAST_MISSING * extent if is_hidden else 0.0)
+        for extent, s, is_hidden in zip(model.extent_m, seen, (is_hidden_u, is_hidden_v), strict=False)
+    )
+    return width, height
+
+
+def _ends_behind_occluder(view: _View, strip: tuple[slice, slice], *, across_columns: bool, is_high: bool) -> bool:
+    """Whether most lines that reach a side of the box have something nearer right outside of it.
+
+    Args:
+        view: see _View.
+        strip: rows and columns from _BAND_PX outside to _RIM_PX inside the side; fewer outside at the image border.
+        across_columns: whether lines run along u (left and right side) or along v.
+        is_high: whether the side is the right or the lower one.
+    """
+    labels, depth_m = view.labels[strip], view.depth_m[strip]
+    if across_columns:
+        labels, depth_m = labels.T, depth_m.T
+    if is_high:
+        labels, depth_m = labels[::-1], depth_m[::-1]
+    labels, depth_m = np.ascontiguousarray(labels), np.ascontiguousarray(depth_m)
+    outside, others = depth_m[:-_RIM_PX], labels[:-_RIM_PX]
+    own = np.where(labels[-_RIM_PX:] == view.label, depth_m[-_RIM_PX:], np.float32(0)).max(axis=0)
+    is_other = (others != 0) & (others != view.label)
+    nearer = np.where(is_other, own - np.float32(_OTHER_MARGIN_M), own - np.float32(view.margin_m))
+    is_nearer = ((outside > 0) & (outside < nearer)).any(axis=0)
+    return bool(2 * np.count_nonzero(is_nearer) > np.count_nonzero(own))

@@ -1,0 +1,61 @@
+"""Constant velocity with random acceleration (paper, Tracking Using EKF, Prediction)."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from dotmask.profiles import Profile
+from dotmask.records import FloatArray, Track
+
+_ROWS, _COLUMNS = np.arange(3), np.arange(3, 6)
+
+
+def transition(dt_s: float) -> FloatArray:
+    """F (6, 6) `[[I, dt I], [0, I]]`."""
+    F = np.eye(6)
+    F[_ROWS, _COLUMNS] = dt_s
+    return F
+
+
+def process_noise(dt_s: float, acceleration_sigmas_m_s2: FloatArray) -> FloatArray:
+    """Q (6, 6) `= Γ Σ Γᵀ`, `Γ = [dt²/2 I; dt I]`: an acceleration that is constant over the frame, Σ its covariance.
+
+    The paper prints `dt² I` as Γ's lower block, and σ³ in the cross terms of the expanded Q; both are misprints (see
+    dotmask.profiles.PAPER).
+
+    Args:
+        dt_s: duration of the frame.
+        acceleration_sigmas_m_s2: (3,) roots of Σ's diagonal, world axes; the components are uncorrelated (paper).
+    """
+    gamma = np.zeros((6, 3))
+    gamma[_ROWS, _ROWS] = 0.5 * dt_s * dt_s
+    gamma[_COLUMNS, _ROWS] = dt_s
+    scaled = gamma * acceleration_sigmas_m_s2
+    return np.asarray(scaled @ scaled.T)
+
+
+def predict(track: Track, timestamp_s: float, profile: Profile) -> Track:
+    """The belief about `track` at a later frame, before that frame is looked at.
+
+    It counts as unseen (one more miss) until an update says otherwise.
+
+    Raises:
+        ValueError: `timestamp_s` is not later than the belief.
+    """
+    dt_s = timestamp_s - track.timestamp_s
+    if not dt_s > 0:
+        raise ValueError(f"predict: frame at {timestamp_s} s is not later than the track's {track.timestamp_s} s")
+    F = transition(dt_s)
+    model = profile.class_model(track.class_name)
+    Q = process_noise(dt_s, model.acceleration_sigma_m_s2 * model.axis_shares)
+    P = F @ track.covariance @ F.T + Q
+    return replace(
+        track,
+        timestamp_s=timestamp_s,
+        mean=F @ track.mean,
+        covariance=0.5 * (P + P.T),
+        age_frames=track.age_frames + 1,
+        misses=track.misses + 1,
+        detection_index=None,
+        innovation=None,
+    )

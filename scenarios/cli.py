@@ -1,0 +1,283 @@
+"""The command line. Each verb checks its input, calls one function and prints its result.
+
+stdout is for results, stderr for progress and errors. Exit codes: 0 done, 1 a threshold was missed, 2 usage or
+environment, 3 a bug. Heavy modules are imported inside the verbs, so that `--help` is quick.
+"""
+
+import sys
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+
+from scenarios.errors import ScenarioError
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
+
+    from scenarios.spec import Scenario
+
+app = typer.Typer(
+    name="dotmask",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode="rich",
+    pretty_exceptions_enable=False,
+    help="Does masking moving objects help your visual SLAM, when does it break, and which stage is to blame?",
+    epilog="Start with:  dotmask list,  dotmask run smoke,  dotmask run fr3_walking_xyz --frames 300 --out runs/a",
+)
+
+Name = Annotated[str, typer.Argument(help="A scenario; `dotmask list` names them.", show_default=False)]
+Overrides = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Change one value, e.g. camera.speed=2. May be repeated."),
+]
+Seed = Annotated[int | None, typer.Option(help="Another seed for the office's looks and the sensor's noise.")]
+Frames = Annotated[int | None, typer.Option(help="Number of frames.")]
+Renderer = Annotated[str, typer.Option(help="Renderer: numba.")]
+Threads = Annotated[int, typer.Option(min=1, max=64, help="Threads of the renderer. The bytes do not depend on it.")]
+
+
+def _console(stderr: bool = False) -> Console:
+    return Console(stderr=stderr, soft_wrap=False)
+
+
+@contextmanager
+def _progress() -> Iterator["Progress"]:
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("frames, elapsed"),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=_console(stderr=True)) as progress:
+        yield progress
+
+
+def _vary(scenario: "Scenario", overrides: list[str] | None, seed: int | None, frames: int | None) -> "Scenario":
+    from scenarios.spec import with_overrides
+
+    changes: dict[str, str] = {}
+    for text in overrides or []:
+        key, sign, value = text.partition("=")
+        if not sign or not key:
+            raise ScenarioError(f"--set {text}: expected KEY=VALUE, for example camera.speed=2")
+        changes[key.strip()] = value.strip()
+    for option, number in (("seed", seed), ("frames", frames)):
+        if number is not None:
+            changes[option] = str(number)
+    return with_overrides(scenario, changes) if changes else scenario
+
+
+def _resolve(
+    name: str | None, source: Path | None, overrides: list[str] | None, seed: int | None, frames: int | None
+) -> "Scenario":
+    """The scenario that the arguments ask for: by name or from a file, then varied."""
+    from scenarios.registry import scenario
+    from scenarios.spec import scenario_from_json
+
+    if (name is None) == (source is None):
+        raise ScenarioError("give the name of a scenario, or --from a scenario.json, not both")
+    if source is not None:
+        try:
+            chosen = scenario_from_json(source.read_text(encoding="utf-8"), str(source))
+        except (OSError, UnicodeDecodeError) as error:
+            raise ScenarioError(f"--from {source}: cannot be read ({error})") from error
+    else:
+        assert name is not None
+        chosen = scenario(name)
+    return _vary(chosen, overrides, seed, frames)
+
+
+@app.command("list")
+def list_scenarios() -> None:
+    """The scenarios, one a line.
+
+    Example:  dotmask list
+    """
+    from rich.table import Table
+
+    from scenarios.registry import SCENARIOS
+
+    table = Table(box=None, pad_edge=False)
+    for heading in ("scenario", "frames", "size", "what happens"):
+        table.add_column(heading, no_wrap=heading != "what happens")
+    for scenario in SCENARIOS.values():
+        size = f"{scenario.camera.width}x{scenario.camera.height}"
+        table.add_row(scenario.name, str(scenario.frames), size, scenario.description)
+    _console().print(table)
+
+
+@app.command()
+def show(name: Name, overrides: Overrides = None) -> None:
+    """A scenario as JSON, with every value it has.
+
+    Example:  dotmask show fr3_walking_xyz --set camera.speed=2 > fast.json
+    """
+    typer.echo(_resolve(name, None, overrides, None, None).to_json(), nl=False)
+
+
+@app.command()
+def render(
+    name: Name,
+    out: Annotated[Path, typer.Option(help="New or empty folder for the sequence.", show_default=False)],
+    overrides: Overrides = None,
+    seed: Seed = None,
+    frames: Frames = None,
+    renderer: Renderer = "numba",
+    threads: Threads = 2,
+) -> None:
+    """Render a scenario into a TUM RGB-D folder, with true masks and object trajectories beside it.
+
+    Example:  dotmask render smoke --out sequences/smoke
+    """
+    from scenarios.render import render_sequence
+
+    scenario = _resolve(name, None, overrides, seed, frames)
+    with _progress() as progress:
+        task = progress.add_task(f"render {scenario.name}", total=scenario.frames)
+        render_sequence(scenario, out, renderer, threads, lambda: progress.advance(task))
+    typer.echo(str(out))
+
+
+@app.command()
+def run(
+    name: Annotated[
+        str | None, typer.Argument(help="A scenario; `dotmask list` names them.", show_default=False)
+    ] = None,
+    source: Annotated[Path | None, typer.Option("--from", help="Repeat the scenario.json of another run.")] = None,
+    methods: Annotated[str, typer.Option(help="Comma-separated: unmasked, mdi, dotmask.")] = "unmasked,mdi,dotmask",
+    segmenter: Annotated[str, typer.Option(help="Segmenter: oracle.")] = "oracle",
+    slam: Annotated[str, typer.Option(help="SLAM back end: embedded.")] = "embedded",
+    profile: Annotated[str, typer.Option(help="Parameters of the method: paper, calibrated.")] = "calibrated",
+    pose_feedback: Annotated[
+        str | None, typer.Option(help="Pose for the tracker: previous, constant_velocity, refined. Default: profile's.")
+    ] = None,
+    renderer: Renderer = "numba",
+    seed: Seed = None,
+    frames: Frames = None,
+    overrides: Overrides = None,
+    threads: Threads = 2,
+    out: Annotated[
+        Path | None, typer.Option(help="New or empty folder for the results. Default: runs/NAME-SEED.")
+    ] = None,
+    expect: Annotated[
+        list[str] | None,
+        typer.Option(metavar="FIGURE<NUMBER", help="Fail with exit code 1 unless it holds, e.g. ate_rmse_m<0.03."),
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print report.json instead of the table.")] = False,
+    video: Annotated[bool, typer.Option(help="Write video.mp4: colour, masks, MO-MDI, trajectories.")] = False,
+) -> None:
+    """Render once, run every method on the same bytes, and compare each stage with the truth.
+
+    Examples:  dotmask run smoke
+
+    dotmask run fr3_walking_xyz --frames 300 --set camera.speed=2 --out runs/fast --expect 'ate_rmse_m<0.03'
+
+    dotmask run --from runs/fast/scenario.json --out runs/again
+    """
+    from scenarios.report import expectation, table, times
+    from scenarios.run import RunSettings, default_out
+    from scenarios.run import run as run_scenario
+
+    scenario = _resolve(name, source, overrides, seed, frames)
+    settings = RunSettings.parse(
+        methods=methods,
+        segmenter=segmenter,
+        slam=slam,
+        profile=profile,
+        pose_feedback=pose_feedback,
+        renderer=renderer,
+        threads=threads,
+        video=video,
+    )
+    expectations = [expectation(text, settings.methods) for text in expect or []]
+    folder = out or default_out(scenario)
+    with _progress() as progress:
+        task = progress.add_task(f"run {scenario.name}", total=scenario.frames)
+        report = run_scenario(scenario, settings, folder, lambda: progress.advance(task))
+    if as_json:
+        typer.echo(report.to_json(), nl=False)
+    else:
+        _console().print(table(report))
+        _console().print(times(report), highlight=False)
+        _console().print(f"frame hash {report.frame_hash[:16]}, results in {folder}", highlight=False)
+    missed = False
+    for wanted in expectations:
+        holds, value = wanted.verdict(report)
+        missed |= not holds
+        measured = "not measured" if value is None else f"{value:.6g}"
+        typer.echo(f"{'holds ' if holds else 'MISSED'} {wanted.method}.{wanted.text}: {measured}", err=True)
+    if missed:
+        raise typer.Exit(1)
+
+
+@app.command()
+def bench(
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer frames: under a minute.")] = False,
+) -> None:
+    """Time every stage on this machine, one core, against its budget and a peer in the same run.
+
+    Example:  dotmask bench --quick
+    """
+    from scenarios.bench import bench_table
+
+    with _progress() as progress:
+        task = progress.add_task("bench", total=None)
+        drawn = bench_table(quick, lambda: progress.advance(task))
+    _console().print(drawn)
+
+
+@app.command()
+def doctor() -> None:
+    """Check that everything this program needs is here and unharmed.
+
+    Example:  dotmask doctor
+    """
+    from scenarios.doctor import examine
+
+    findings = examine()
+    for finding in findings:
+        mark = "ok " if finding.is_well else ("BAD" if finding.is_needed else "-  ")
+        typer.echo(f"{mark} {finding.what}: {finding.said}")
+    if any(f.is_needed and not f.is_well for f in findings):
+        raise typer.Exit(2)
+
+
+def main() -> None:
+    """Entry point: turns errors into one line and an exit code."""
+    from dotmask.errors import DotmaskError
+    from sim.errors import SimError
+
+    try:
+        app()
+    except (ScenarioError, SimError, DotmaskError) as error:
+        typer.echo(f"dotmask: {error}", err=True)
+        sys.exit(2)
+    except KeyboardInterrupt:
+        typer.echo("dotmask: interrupted; nothing was written", err=True)
+        sys.exit(130)
+    except Exception:
+        traceback.print_exc()
+        typer.echo("dotmask: this is a bug; please report the lines above", err=True)
+        sys.exit(3)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,33 @@
+"""The named scenarios."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from scenarios.catalog import fr3_sitting, fr3_walking, smoke
+from scenarios.errors import unknown
+from scenarios.spec import Scenario
+
+
+def _collect() -> dict[str, Scenario]:
+    named: dict[str, Scenario] = {}
+    for module in (smoke, fr3_walking, fr3_sitting):
+        for scenario in module.SCENARIOS:
+            if scenario.name in named:
+                raise ValueError(f"two scenarios are called {scenario.name}")
+            named[scenario.name] = scenario
+    return named
+
+
+SCENARIOS: Mapping[str, Scenario] = MappingProxyType(_collect())
+"""All scenarios by name."""
+
+
+def scenario(name: str) -> Scenario:
+    """The scenario called `name`.
+
+    Raises:
+        ScenarioError: there is none; the message names near matches.
+    """
+    if name not in SCENARIOS:
+        raise unknown("scenario", name, SCENARIOS)
+    return SCENARIOS[name]

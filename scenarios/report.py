@@ -1,0 +1,249 @@
+"""The report: schema 1 of `report.json`, and the table that people read."""
+
+import operator
+import re
+from collections.abc import Callable
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+from rich.box import SIMPLE
+from rich.table import Table
+
+from scenarios.errors import ScenarioError
+
+Measured = Annotated[float | None, Field(allow_inf_nan=False)]
+"""A figure, or null when it was not measured: never 0 in its place."""
+
+
+class Part(BaseModel):
+    """Common rules of the report's parts."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
+
+
+class LoopReport(Part):
+    """Loop closures: their number and the mean error of the relative poses they claim."""
+
+    count: int | None = None
+    trans_error_m: Measured = None
+    rot_error_rad: Measured = None
+
+
+class EkfReport(Part):
+    """Errors of the tracker's beliefs, over all frames in which a track was observed.
+
+    Attributes:
+        position_rmse_m: against the true centre of the object.
+        position_rmse_ideal_m: against what the estimator's own observation gives on perfect images.
+        velocity_rmse_m_s: against the velocity of the centre.
+        nees: mean normalised estimation error squared of position and velocity against the centre; 6 if consistent.
+        nis: mean normalised innovation squared; 3 if consistent.
+    """
+
+    position_rmse_m: Measured = None
+    position_rmse_ideal_m: Measured = None
+    velocity_rmse_m_s: Measured = None
+    nees: Measured = None
+    nis: Measured = None
+
+
+class TrackingReport(Part):
+    """Multi-object tracking scores."""
+
+    mota: Measured = None
+    idf1: Measured = None
+    hota: Measured = None
+    switches: int | None = None
+
+
+class MocReport(Part):
+    """Moving object classification; latencies are medians in frames."""
+
+    precision: Measured = None
+    recall: Measured = None
+    flag_latency_frames: Measured = None
+    unflag_latency_frames: Measured = None
+
+
+class MaskReport(Part):
+    """Masks, over all frames and pixels with depth.
+
+    Attributes:
+        iou: mean over the matched detections.
+        leak: share of the moving objects' pixels that odometry still sees.
+        waste: share of the static pixels that odometry lost.
+    """
+
+    iou: Measured = None
+    leak: Measured = None
+    waste: Measured = None
+
+
+class MapReport(Part):
+    """The map: ghosts of moving objects, accuracy and completeness against the scene."""
+
+    ghost_fraction: Measured = None
+    accuracy_m: Measured = None
+    completeness: Measured = None
+
+
+class StageTimes(Part):
+    """Mean CPU time per frame in milliseconds, of one thread."""
+
+    segment: Measured = None
+    track: Measured = None
+    classify: Measured = None
+    mask: Measured = None
+    odometry: Measured = None
+    map: Measured = None
+
+
+class MethodReport(Part):
+    """All figures of one method."""
+
+    ate_rmse_m: Measured
+    rpe_trans_rmse_m: Measured
+    rpe_rot_rmse_rad: Measured
+    tracked_frames: int
+    loops: LoopReport = LoopReport()
+    ekf: EkfReport = EkfReport()
+    tracking: TrackingReport = TrackingReport()
+    moc: MocReport = MocReport()
+    masks: MaskReport = MaskReport()
+    map: MapReport = MapReport()
+    time_ms: StageTimes
+
+
+class WorldTimes(Part):
+    """Mean wall time per frame in milliseconds of making a frame (rendering, truth, sensor), beside the methods."""
+
+    render: Measured = None
+
+
+class Report(Part):
+    """`report.json`, schema 1."""
+
+    schema_version: int = Field(default=1, alias="schema")
+    scenario: str
+    seed: int
+    frames: int
+    renderer: str
+    segmenter: str
+    slam: str
+    profile: str
+    frame_hash: str
+    methods: dict[str, MethodReport]
+    time_ms: WorldTimes
+
+    def to_json(self) -> str:
+        """The text of `report.json`."""
+        return self.model_dump_json(indent=2, by_alias=True) + "\n"
+
+
+def _number(value: float | None, scale: float = 1.0, digits: int = 1) -> str:
+    return "-" if value is None else f"{value * scale:.{digits}f}"
+
+
+COLUMNS: tuple[tuple[str, Callable[[MethodReport, Report], str]], ...] = (
+    ("ATE\nmm", lambda m, _: _number(m.ate_rmse_m, 1e3)),
+    ("RPE\nmm", lambda m, _: _number(m.rpe_trans_rmse_m, 1e3)),
+    ("frames\nlost", lambda m, r: str(r.frames - m.tracked_frames)),
+    ("EKF\nmm", lambda m, _: _number(m.ekf.position_rmse_ideal_m, 1e3, 0)),
+    ("EKF\nm/s", lambda m, _: _number(m.ekf.velocity_rmse_m_s, 1, 2)),
+    ("MOC\nprec.", lambda m, _: _number(m.moc.precision, 1, 3)),
+    ("MOC\nrecall", lambda m, _: _number(m.moc.recall, 1, 3)),
+    ("leak\n%", lambda m, _: _number(m.masks.leak, 100)),
+    ("waste\n%", lambda m, _: _number(m.masks.waste, 100)),
+)
+"""Headings and cells of the table: it fits a terminal of 80 columns."""
+
+
+def _method_ms(times: StageTimes) -> float | None:
+    stages = [t for t in (times.track, times.classify, times.mask) if t is not None]
+    return sum(stages) if stages else None
+
+
+def table(report: Report) -> Table:
+    """The table of one run: a row a method."""
+    title = (
+        f"{report.scenario}, seed {report.seed}, {report.frames} frames: segmenter {report.segmenter}, "
+        f"SLAM {report.slam}, profile {report.profile}"
+    )
+    drawn = Table(title=title, title_justify="left", box=SIMPLE, padding=(0, 1, 0, 0), pad_edge=False)
+    drawn.add_column("method", no_wrap=True)
+    for heading, _ in COLUMNS:
+        drawn.add_column(heading, justify="right", no_wrap=True)
+    for name, method in report.methods.items():
+        drawn.add_row(name, *(cell(method, report) for _, cell in COLUMNS))
+    return drawn
+
+
+def times(report: Report) -> str:
+    """One line: wall time per frame of making the frames, CPU time per frame of each method's stages."""
+    parts = []
+    for name, method in report.methods.items():
+        masking = _method_ms(method.time_ms)
+        stages = [] if masking is None else [f"masking {masking:.1f}"]
+        parts.append(f"{name}: {', '.join([*stages, f'odometry {_number(method.time_ms.odometry)}'])}")
+    return f"ms per frame: render {_number(report.time_ms.render)} (wall); CPU of " + "; ".join(parts)
+
+
+COMPARISONS: dict[str, Callable[[float, float], bool]] = {
+    "<=": operator.le,
+    ">=": operator.ge,
+    "<": operator.lt,
+    ">": operator.gt,
+}
+
+
+class Expectation(BaseModel):
+    """A threshold on a figure of the report, for example `ate_rmse_m<0.03` or `unmasked.ate_rmse_m>0.1`."""
+
+    model_config = ConfigDict(frozen=True)
+
+    text: str
+    method: str
+    path: tuple[str, ...]
+    sign: str
+    bound: float
+
+    def verdict(self, report: Report) -> tuple[bool, float | None]:
+        """Whether it holds, and the measured figure. A figure that was not measured does not hold."""
+        value: object = report.methods[self.method]
+        for part in self.path:
+            value = getattr(value, part)
+        if not isinstance(value, int | float):
+            return False, None
+        return COMPARISONS[self.sign](float(value), self.bound), float(value)
+
+
+def expectation(text: str, methods: tuple[str, ...]) -> Expectation:
+    """Parse `[METHOD.]FIGURE<BOUND`; without a method the last one of the run is meant.
+
+    Raises:
+        ScenarioError: not of that form, or no such figure.
+    """
+    match = re.fullmatch(r"\s*([\w.]+)\s*(<=|>=|<|>)\s*([-+.\deE]+)\s*", text)
+    if match is None:
+        raise ScenarioError(f"--expect {text}: expected FIGURE<NUMBER, for example ate_rmse_m<0.03")
+    key, sign, number = match.groups()
+    parts = key.split(".")
+    method = parts.pop(0) if parts[0] in methods else methods[-1]
+    model: type[BaseModel] = MethodReport
+    for depth, part in enumerate(parts):
+        if part not in model.model_fields:
+            raise ScenarioError(f"--expect {text}: no figure '{part}'; known: {', '.join(model.model_fields)}")
+        inner = model.model_fields[part].annotation
+        if isinstance(inner, type) and issubclass(inner, BaseModel):
+            model = inner
+            if depth == len(parts) - 1:
+                raise ScenarioError(f"--expect {text}: name one of {part}: {', '.join(inner.model_fields)}")
+        elif depth < len(parts) - 1:
+            raise ScenarioError(f"--expect {text}: '{part}' has no parts")
+    if not parts:
+        raise ScenarioError(f"--expect {text}: name a figure, for example ate_rmse_m")
+    try:
+        bound = float(number)
+    except ValueError:
+        raise ScenarioError(f"--expect {text}: '{number}' is no number") from None
+    return Expectation(text=text, method=method, path=tuple(parts), sign=sign, bound=bound)

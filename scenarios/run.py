@@ -1,0 +1,223 @@
+"""Render once, run every method on the same bytes, judge each stage, leave a run folder."""
+
+import hashlib
+import json
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import cast, get_args
+
+import cv2
+
+from dotmask.interfaces import Segmenter
+from dotmask.pipeline import ClosedLoop, DotMask, FrontEnd, MaskAll, PoseFeedback, Unmasked
+from dotmask.profiles import Profile
+from dotmask.profiles import profile as get_profile
+from dotmask.records import FloatArray, RgbdFrame
+from dotmask.slam.embedded import EmbeddedSlam
+from dotmask.tum import format_trajectory
+from scenarios.bridge import rgbd_frame_from_sim
+from scenarios.errors import ScenarioError, unknown
+from scenarios.judge import Judge
+from scenarios.oracle import OracleSegmenter
+from scenarios.report import Report, WorldTimes
+from scenarios.run_folder import RunFolder, versions
+from scenarios.spec import Scenario
+from scenarios.video import Video
+from scenarios.world import RENDERERS, build_simulator
+from sim.records import SimFrame
+from sim.simulator import Simulator
+
+METHODS: dict[str, Callable[[Segmenter, Profile], FrontEnd]] = {
+    "unmasked": lambda segmenter, chosen: Unmasked(),
+    "mdi": MaskAll,
+    "dotmask": DotMask,
+}
+"""What may be compared: raw depth to both, all objects of interest removed from both, the method."""
+
+SEGMENTERS = ("oracle",)
+SLAM_BACKENDS = ("embedded",)
+
+FRAMES_AHEAD = 3
+"""Frames rendered ahead of the methods: enough to keep both cores busy, few enough to keep memory flat."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunSettings:
+    """How a scenario is run; what happens in it is the scenario's own business."""
+
+    methods: tuple[str, ...]
+    segmenter: str
+    slam: str
+    profile: str
+    pose_feedback: PoseFeedback
+    renderer: str
+    threads: int
+    video: bool
+
+    @classmethod
+    def parse(
+        cls,
+        *,
+        methods: str = "unmasked,mdi,dotmask",
+        segmenter: str = "oracle",
+        slam: str = "embedded",
+        profile: str = "calibrated",
+        pose_feedback: str | None = None,
+        renderer: str = "numba",
+        threads: int = 2,
+        video: bool = False,
+    ) -> "RunSettings":
+        """Settings from the words of a command line.
+
+        Raises:
+            ScenarioError: a name that does not exist, with near matches.
+            dotmask.errors.ProfileError: no such profile.
+        """
+        chosen = tuple(dict.fromkeys(m.strip() for m in methods.split(",") if m.strip()))
+        if not chosen:
+            raise ScenarioError(f"--methods: name at least one of {', '.join(METHODS)}")
+        feedback = pose_feedback if pose_feedback is not None else get_profile(profile).pose_feedback
+        for kind, name, known in (
+            *(("method", m, tuple(METHODS)) for m in chosen),
+            ("segmenter", segmenter, SEGMENTERS),
+            ("SLAM back end", slam, SLAM_BACKENDS),
+            ("renderer", renderer, tuple(RENDERERS)),
+            ("pose feedback", feedback, get_args(PoseFeedback)),
+        ):
+            if name not in known:
+                raise unknown(kind, name, known)
+        return cls(
+            methods=chosen,
+            segmenter=segmenter,
+            slam=slam,
+            profile=profile,
+            pose_feedback=cast(PoseFeedback, feedback),
+            renderer=renderer,
+            threads=threads,
+            video=video,
+        )
+
+
+def default_out(scenario: Scenario) -> Path:
+    """`runs/NAME-SEED`, or the first free `runs/NAME-SEED-2` and so on."""
+    base = Path("runs") / f"{scenario.name}-{scenario.seed}"
+    number, path = 1, base
+    while path.exists():
+        number += 1
+        path = base.with_name(f"{base.name}-{number}")
+    return path
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TimedFrame:
+    """A frame and the wall time that making it took."""
+
+    frame: SimFrame
+    seconds: float
+
+
+def rendered_ahead(simulator: Simulator) -> Iterator[TimedFrame]:
+    """The frames in order, made by a second thread a few frames ahead of the consumer."""
+
+    def make(index: int) -> TimedFrame:
+        start = time.perf_counter()
+        frame = simulator.frame(index)
+        return TimedFrame(frame=frame, seconds=time.perf_counter() - start)
+
+    pending: deque[Future[TimedFrame]] = deque()
+    with ThreadPoolExecutor(max_workers=1, thread_name_prefix="render") as pool:
+        try:
+            for index in range(len(simulator)):
+                pending.append(pool.submit(make, index))
+                if len(pending) > FRAMES_AHEAD:
+                    yield pending.popleft().result()
+            while pending:
+                yield pending.popleft().result()
+        finally:
+            for future in pending:
+                future.cancel()
+
+
+def run(scenario: Scenario, settings: RunSettings, out: Path, advance: Callable[[], None]) -> Report:
+    """Run a scenario and write the run folder `out`.
+
+    Args:
+        scenario: what happens.
+        settings: how it is run.
+        out: a new or empty folder.
+        advance: called after every frame.
+
+    Raises:
+        ScenarioError, SimError, DotmaskError: bad input; nothing is left in `out`.
+    """
+    with RunFolder(out) as folder, one_opencv_thread(), ThreadPoolExecutor(len(settings.methods)) as pool:
+        folder.write("scenario.json", scenario.to_json())
+        simulator = build_simulator(scenario, settings.renderer, settings.threads)
+        oracle = OracleSegmenter()
+        loops: dict[str, ClosedLoop] = {}
+        judges = {name: Judge(name) for name in settings.methods}
+        digest, render_seconds = hashlib.sha256(), 0.0
+        video = Video(folder.path / "video.mp4", scenario, settings.methods) if settings.video else None
+        for timed in rendered_ahead(simulator):
+            sim_frame = timed.frame
+            render_seconds += timed.seconds
+            digest.update(sim_frame.rgb.tobytes())
+            digest.update(sim_frame.depth_m.tobytes())
+            frame = rgbd_frame_from_sim(sim_frame)
+            oracle.show(frame.index, sim_frame.truth)
+            if not loops:
+                # The first true pose fixes the world of the estimates, as the alignment of a trajectory would.
+                start = sim_frame.truth.T_world_camera
+                loops = {name: _closed_loop(name, settings, oracle, frame, start) for name in settings.methods}
+            # Each method has its own state, so the order in which they are done cannot matter.
+            steps = pool.map(lambda loop, now=frame: loop.step(now), loops.values())
+            results = dict(zip(loops, steps, strict=True))
+            for name, result in results.items():
+                judges[name].see(sim_frame.truth, result, folder)
+            if video is not None:
+                video.add(sim_frame, results)
+            advance()
+        if video is not None:
+            video.close()
+        report = Report(
+            scenario=scenario.name,
+            seed=scenario.seed,
+            frames=scenario.frames,
+            renderer=settings.renderer,
+            segmenter=settings.segmenter,
+            slam=settings.slam,
+            profile=settings.profile,
+            frame_hash=digest.hexdigest(),
+            methods={name: judge.report() for name, judge in judges.items()},
+            time_ms=WorldTimes(render=1e3 * render_seconds / scenario.frames),
+        )
+        folder.write("trajectory_truth.txt", format_trajectory(judges[settings.methods[0]].truth_trajectory()))
+        for name, judge in judges.items():
+            folder.write(f"trajectory_{name}.txt", format_trajectory(judge.estimated_trajectory()))
+        folder.write("versions.json", json.dumps(versions(), indent=2) + "\n")
+        folder.write("report.json", report.to_json())
+    return report
+
+
+def _closed_loop(
+    name: str, settings: RunSettings, segmenter: Segmenter, first: RgbdFrame, T_world_camera: FloatArray
+) -> ClosedLoop:
+    front_end = METHODS[name](segmenter, get_profile(settings.profile))
+    slam = EmbeddedSlam(first.intrinsics, T_world_camera)
+    return ClosedLoop(front_end, slam, settings.pose_feedback, T_world_camera)
+
+
+@contextmanager
+def one_opencv_thread() -> Iterator[None]:
+    """OpenCV's own threads are off inside the block: the methods and the renderer keep the cores busy already."""
+    before = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        yield
+    finally:
+        cv2.setNumThreads(before)

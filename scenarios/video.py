@@ -1,0 +1,146 @@
+"""Pictures of a run: what the camera saw, what the method decided, what SLAM was given, and where everybody went."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from dotmask.pipeline import FrameResult
+from scenarios.errors import ScenarioError
+from scenarios.spec import Scenario
+from sim.records import SimFrame
+
+Picture = npt.NDArray[np.uint8]
+
+MOVING, IDLE = (230, 60, 50), (70, 200, 90)
+TRUTH = (245, 245, 245)
+METHOD_COLOURS = ((240, 120, 60), (90, 170, 250), (110, 220, 120))
+BACKGROUND = (24, 26, 32)
+DEPTH_RANGE_M = (0.5, 5.0)
+
+
+def colour_panel(frame: SimFrame, result: FrameResult) -> Picture:
+    """The colour image with the detections tinted: red = moving, green = idle, and each track's class, id and speed."""
+    image = frame.rgb.copy()
+    detections = result.front_end.detections
+    if detections is None:
+        return image
+    tracks = {t.detection_index: t for t in result.front_end.tracks if t.detection_index is not None}
+    for index in range(len(detections)):
+        track = tracks.get(index)
+        moving = track is None or track.verdict is None or track.verdict.is_moving
+        colour = MOVING if moving else IDLE
+        mask = detections.masks[index]
+        image[mask] = (0.65 * image[mask] + 0.35 * np.array(colour)).astype(np.uint8)
+        outline, _ = cv2.findContours(mask.view(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+        cv2.drawContours(image, outline, -1, colour, 2)
+        if track is not None:
+            u, v = detections.boxes_px[index][:2].astype(int)
+            speed = float(np.linalg.norm(track.velocity_world))
+            text = f"{track.class_name} {track.track_id}  {speed:.2f} m/s"
+            _label(image, text, (max(u, 2), max(v - 6, 14)))
+    return image
+
+
+def depth_panel(depth_m: npt.NDArray[np.float32]) -> Picture:
+    """Depth in colour, near = warm; black = no return or masked."""
+    near, far = DEPTH_RANGE_M
+    scaled = np.clip((far - depth_m) / (far - near), 0, 1) * 255
+    picture = cv2.cvtColor(cv2.applyColorMap(scaled.astype(np.uint8), cv2.COLORMAP_TURBO), cv2.COLOR_BGR2RGB)
+    picture[depth_m == 0] = 0
+    return np.asarray(picture, np.uint8)
+
+
+def _label(image: Picture, text: str, corner: tuple[int, int]) -> None:
+    for colour, width in (((0, 0, 0), 3), ((255, 255, 255), 1)):
+        cv2.putText(image, text, corner, cv2.FONT_HERSHEY_SIMPLEX, 0.5, colour, width, cv2.LINE_AA)
+
+
+class PathsPanel:
+    """The camera's true path and each method's estimate, seen from above, drawn further with every frame."""
+
+    def __init__(self, width: int, height: int, methods: tuple[str, ...]) -> None:
+        self._size, self._methods = (width, height), methods
+        self._paths: dict[str, list[npt.NDArray[np.float64] | None]] = {name: [] for name in ("truth", *methods)}
+
+    def add(self, frame: SimFrame, results: Mapping[str, FrameResult]) -> None:
+        """Append this frame's positions."""
+        self._paths["truth"].append(frame.truth.T_world_camera[:2, 3])
+        for name in self._methods:
+            pose = results[name].pose.T_world_camera
+            self._paths[name].append(None if pose is None else pose[:2, 3])
+
+    def draw(self) -> Picture:
+        """The panel; the scale fits all paths."""
+        width, height = self._size
+        image = np.full((height, width, 3), BACKGROUND, np.uint8)
+        points = np.array([p for path in self._paths.values() for p in path if p is not None])
+        low, high = points.min(axis=0), points.max(axis=0)
+        span = max(float((high - low).max()), 0.2)
+        middle = (low + high) / 2
+        scale = 0.8 * min(width, height) / span
+        colours = (TRUTH, *METHOD_COLOURS)
+        for row, ((name, path), colour) in enumerate(zip(self._paths.items(), colours, strict=False)):
+            previous = None
+            for point in path:
+                pixel = None
+                if point is not None:
+                    u, v = width / 2 + (point[0] - middle[0]) * scale, height / 2 - (point[1] - middle[1]) * scale
+                    pixel = (round(u), round(v))
+                    if previous is not None:
+                        cv2.line(image, previous, pixel, colour, 2 if name == "truth" else 1, cv2.LINE_AA)
+                previous = pixel
+            cv2.putText(image, name, (12, 22 + 20 * row), cv2.FONT_HERSHEY_SIMPLEX, 0.5, colour, 1, cv2.LINE_AA)
+        _label(image, f"camera from above, {span:.2f} m across", (12, height - 12))
+        return image
+
+
+def mosaic(panels: list[tuple[str, Picture]]) -> Picture:
+    """Four titled panels of one size, two by two."""
+    for title, panel in panels:
+        _label(panel, title, (12, panel.shape[0] - 12))
+    pictures = [panel for _, panel in panels]
+    return np.vstack([np.hstack(pictures[:2]), np.hstack(pictures[2:])])
+
+
+class Video:
+    """Writes the mosaic of every frame to an mp4 file.
+
+    Raises:
+        ScenarioError: OpenCV has no encoder for it here.
+    """
+
+    def __init__(self, path: Path, scenario: Scenario, methods: tuple[str, ...]) -> None:
+        width, height = scenario.camera.width, scenario.camera.height
+        self._shown = "dotmask" if "dotmask" in methods else methods[-1]
+        self._paths = PathsPanel(width, height, methods)
+        self._size = (3 * width // 2, 3 * height // 2)
+        self._writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), scenario.frame_rate_hz, self._size)
+        if not self._writer.isOpened():
+            raise ScenarioError("--video: this build of OpenCV cannot write mp4 files; run without --video")
+
+    def add(self, frame: SimFrame, results: Mapping[str, FrameResult]) -> None:
+        """Append one frame."""
+        self._paths.add(frame, results)
+        picture = frame_picture(frame, results[self._shown], self._paths)
+        smaller = cv2.resize(picture, self._size, interpolation=cv2.INTER_AREA)
+        self._writer.write(cv2.cvtColor(smaller, cv2.COLOR_RGB2BGR))
+
+    def close(self) -> None:
+        """Finish the file."""
+        self._writer.release()
+
+
+def frame_picture(frame: SimFrame, result: FrameResult, paths: PathsPanel) -> Picture:
+    """The mosaic of one frame."""
+    masked = result.front_end.masked
+    return mosaic(
+        [
+            ("red: moving, green: idle", colour_panel(frame, result)),
+            ("MO-MDI, to odometry", depth_panel(masked.mo_mdi_m)),
+            ("MDI, to the map", depth_panel(masked.mdi_m)),
+            ("", paths.draw()),
+        ]
+    )

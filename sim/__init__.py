@@ -1,0 +1,3 @@
+"""The world: geometry, light, motion and the camera's sensor. It never knows the method."""
+
+DISTRIBUTION = "dotmask"

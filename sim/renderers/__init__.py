@@ -1,0 +1,1 @@
+"""Renderers: they turn a posed scene into colour, depth and instance ids."""

@@ -1,0 +1,278 @@
+"""Shading: the second half of the renderer's inner loops. Compiled by numba, under the rules of `kernels`.
+
+With the notation of `kernels`: z is known from the visibility buffer, so Bi = z (r . ei) / det are the true barycentric
+coordinates of a pixel's point, and an attribute is their weighted sum. The surface area that one pixel sees is
+dA = z^3 / d / (fx fy), with d = |det| / (2 A) the distance of the triangle's plane from the camera. So the texels per
+pixel (an area, slant included) are size^2 |uv cross product| z^3 / (|det| fx fy).
+"""
+
+# mypy: ignore-errors
+# (numba infers the types of these functions from their arguments; numpy's own annotations do not describe them)
+
+import numpy as np
+from numba import njit
+
+from sim.renderers.kernels import KERNEL, cross
+
+f32 = np.float32
+
+BLOCK = 64
+"""Pixels shaded together. Its scratch rows have a constant distance, so LLVM can prove that they do not overlap and
+vectorise the lighting."""
+
+TEXEL_AREA_MAX = f32(2.0)
+"""Texels per pixel (area) from which the next mip level is used alone."""
+BLEND_FROM = f32(1.0)
+"""Texels per pixel (area) from which the next mip level is mixed in."""
+
+SHADOW_NEAR = f32(0.05)
+SHADOW_TANGENT = 2.75
+"""A shadow camera looks straight down and sees this far sideways per metre of depth; beyond, all is lit."""
+SHADOW_DEPTH_BIAS = f32(0.01)
+SHADOW_OFFSET_TEXELS = f32(2.2)
+"""Points are moved along their normal by this many shadow texels before the test, against self-shadowing."""
+
+BRIGHTNESS_KNEE = f32(0.7)
+"""Brightness above it is compressed and stays below 1: no channel burns out."""
+
+
+@njit(**KERNEL)
+def spread(texel):
+    """0x00bbggrr to three 16-bit fields, so that one multiplication serves three channels."""
+    t = np.int64(texel)
+    return (t & 0xFF) | ((t & 0xFF00) << 8) | ((t & 0xFF0000) << 16)
+
+
+@njit(**KERNEL)
+def bilinear(texels, level, size, u, v):
+    """Mean of four texels of the mip level that begins at `level`, as three 16-bit fields (r, g, b from below).
+
+    u, v >= 0 are in 1/256 texel and repeat beyond `size`, a power of two.
+    """
+    wrap = size - 1
+    u0, v0 = (u >> 8) & wrap, (v >> 8) & wrap
+    u1, v1 = (u0 + 1) & wrap, (v0 + 1) & wrap
+    top, bottom = level + v0 * size, level + v1 * size
+    weight_u, weight_v = u & 255, v & 255
+    w11 = (weight_u * weight_v) >> 8
+    total = spread(texels[np.uint64(top + u0)]) * (256 - weight_u - weight_v + w11)
+    total += spread(texels[np.uint64(top + u1)]) * (weight_u - w11)
+    total += spread(texels[np.uint64(bottom + u0)]) * (weight_v - w11)
+    total += spread(texels[np.uint64(bottom + u1)]) * w11
+    return (total >> 8) & 0xFF00FF00FF
+
+
+@njit(**KERNEL)
+def lit(inverse_z, limit):
+    """1 where the nearest surface seen by the light is not in front of the point."""
+    return f32(1) if inverse_z <= limit else f32(0)
+
+
+@njit(**KERNEL)
+def shade(
+    camera,
+    attributes,
+    faces,
+    face_texture,
+    face_id,
+    texels,
+    texture_offset,
+    texture_size,
+    fx,
+    fy,
+    cx,
+    cy,
+    T_world_camera,
+    row_first,
+    row_last,
+    inverse_depth,
+    triangles,
+    lights,
+    ambient,
+    shadow_maps,
+    rgb,
+    depth,
+    ids,
+):
+    """Colour, z-depth and id of the rows row_first..row_last-1, from the visibility buffer.
+
+    Per block of pixels: interpolate the attributes, add up the light, look up the texture. Light varies slowly, so two
+    neighbours on one triangle share a lane of the lighting.
+    """
+    one, half, zero = f32(1), f32(0.5), f32(0)
+    u1, u3 = np.uint64(1), np.uint64(3)
+    width = triangles.shape[1]
+    inverse_fx, inverse_fy = 1.0 / fx, 1.0 / fy
+    inverse_focals = inverse_fx * inverse_fy
+    T = T_world_camera
+    shadow_size = shadow_maps.shape[1]
+    shadows = shadow_maps.ravel()
+    stride = np.uint64(shadow_size)
+    shadow_high = f32(shadow_size - 2)
+    shadow_centre = f32(shadow_size - 1) * half
+    shadow_focal = f32(shadow_size * 0.5 / SHADOW_TANGENT)
+    offset_per_metre = SHADOW_OFFSET_TEXELS / shadow_focal if shadow_size > 0 else zero
+    # Rows of the scratch, by pixel: 0-1 uv, 2 texels per pixel; by lane: 3-5 normal, 6 ray x, 7 z, 8-10 position,
+    # 11 brightness, 12 one light's share, 13-14 shadow texel, 15 limit of 1/z in the shadow map.
+    s = np.zeros(16 * BLOCK, np.float32)
+    face_of = np.zeros(BLOCK, np.int64)
+    lane_of = np.zeros(BLOCK, np.int64)
+    for y in range(row_first, row_last):
+        ray_y = (y - cy) * inverse_fy
+        ray_y32 = f32(ray_y)
+        row_x = T[0, 1] * ray_y32 + T[0, 2]
+        row_y = T[1, 1] * ray_y32 + T[1, 2]
+        row_z = T[2, 1] * ray_y32 + T[2, 2]
+        for x_first in range(0, width, BLOCK):
+            count = min(BLOCK, width - x_first)
+            previous, lanes, is_open = -1, 0, False
+            i = j = k = np.uint32(0)
+            q1x = q1 = q2x = q2 = density = zero
+            for n in range(count):
+                x = x_first + n
+                t = triangles[y, x]
+                face_of[n] = t
+                if t < 0:
+                    rgb[y, x, 0] = rgb[y, x, 1] = rgb[y, x, 2] = 0
+                    depth[y, x] = 0
+                    ids[y, x] = 0
+                    continue
+                z = one / inverse_depth[y, x]
+                depth[y, x] = z
+                if t != previous:  # neighbours mostly share the triangle: keep its constants
+                    previous, is_open = t, False
+                    face = np.uint32(t)
+                    i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
+                    ax, ay, az = np.float64(camera[i, 0]), np.float64(camera[i, 1]), np.float64(camera[i, 2])
+                    bx, by, bz = np.float64(camera[j, 0]), np.float64(camera[j, 1]), np.float64(camera[j, 2])
+                    gx, gy, gz = np.float64(camera[k, 0]), np.float64(camera[k, 1]), np.float64(camera[k, 2])
+                    e1x, e1y, e1z = cross(gx, gy, gz, ax, ay, az)
+                    e2x, e2y, e2z = cross(ax, ay, az, bx, by, bz)
+                    inverse_det = 1.0 / (bx * e1x + by * e1y + bz * e1z)
+                    q1x, q2x = f32(e1x * inverse_det), f32(e2x * inverse_det)
+                    q1, q2 = f32((e1y * ray_y + e1z) * inverse_det), f32((e2y * ray_y + e2z) * inverse_det)
+                    size = np.float64(texture_size[face_texture[face]])
+                    du1, dv1 = attributes[j, 6] - attributes[i, 6], attributes[j, 7] - attributes[i, 7]
+                    du2, dv2 = attributes[k, 6] - attributes[i, 6], attributes[k, 7] - attributes[i, 7]
+                    uv_area = abs(du1 * dv2 - dv1 * du2)
+                    density = f32(size * size * uv_area * abs(inverse_det) * inverse_focals)
+                    identity = face_id[face]
+                ids[y, x] = identity
+                ray_x = f32((x - cx) * inverse_fx)
+                # Rounding must not leave the triangle: the thinner it is, the farther it would lead.
+                b1 = min(max((q1x * ray_x + q1) * z, zero), one)
+                b2 = min(max((q2x * ray_x + q2) * z, zero), one - b1)
+                b0 = one - b1 - b2
+                s[n] = attributes[i, 6] * b0 + attributes[j, 6] * b1 + attributes[k, 6] * b2
+                s[BLOCK + n] = attributes[i, 7] * b0 + attributes[j, 7] * b1 + attributes[k, 7] * b2
+                s[2 * BLOCK + n] = density * z * z * z
+                if is_open:
+                    is_open = False
+                else:
+                    is_open = True
+                    for c in range(3, 6):
+                        s[c * BLOCK + lanes] = attributes[i, c] * b0 + attributes[j, c] * b1 + attributes[k, c] * b2
+                    s[6 * BLOCK + lanes] = ray_x
+                    s[7 * BLOCK + lanes] = z
+                    lanes += 1
+                lane_of[n] = lanes - 1
+            groups = (lanes + 7) >> 3  # of 8 lanes: the inner loops below become single vector instructions
+
+            # Position, unit normal; ambient light from above is stronger than from below: unlit sides keep shape.
+            for g in range(groups):
+                for n in range(8 * g, 8 * g + 8):
+                    ray_x, z = s[6 * BLOCK + n], s[7 * BLOCK + n]
+                    s[8 * BLOCK + n] = (T[0, 0] * ray_x + row_x) * z + T[0, 3]
+                    s[9 * BLOCK + n] = (T[1, 0] * ray_x + row_y) * z + T[1, 3]
+                    s[10 * BLOCK + n] = (T[2, 0] * ray_x + row_z) * z + T[2, 3]
+                    nx, ny, nz = s[3 * BLOCK + n], s[4 * BLOCK + n], s[5 * BLOCK + n]
+                    scale = one / np.sqrt(nx * nx + ny * ny + nz * nz + f32(1e-20))
+                    s[3 * BLOCK + n], s[4 * BLOCK + n], s[5 * BLOCK + n] = nx * scale, ny * scale, nz * scale
+                    s[11 * BLOCK + n] = ambient * (one + f32(0.25) * (nz * scale))
+
+            for m in range(lights.shape[0]):
+                light_x, light_y, light_z, power = lights[m, 0], lights[m, 1], lights[m, 2], lights[m, 3]
+                for g in range(groups):
+                    for n in range(8 * g, 8 * g + 8):
+                        lx = light_x - s[8 * BLOCK + n]
+                        ly = light_y - s[9 * BLOCK + n]
+                        lz = light_z - s[10 * BLOCK + n]
+                        nx, ny, nz = s[3 * BLOCK + n], s[4 * BLOCK + n], s[5 * BLOCK + n]
+                        squared = lx * lx + ly * ly + lz * lz
+                        facing = lx * nx + ly * ny + lz * nz
+                        facing = facing if facing > zero else zero
+                        s[12 * BLOCK + n] = facing * power / (np.sqrt(squared + f32(1e-12)) * (one + squared))
+                        # The shadow camera looks straight down: its axes are +x, -y, -z of the world.
+                        offset = lz * offset_per_metre
+                        offset = offset if offset > f32(0.005) else f32(0.005)
+                        shadow_z = lz - nz * offset
+                        shadow_z = shadow_z if shadow_z > SHADOW_NEAR else SHADOW_NEAR
+                        scale = shadow_focal / shadow_z
+                        s[13 * BLOCK + n] = (nx * offset - lx) * scale + shadow_centre
+                        s[14 * BLOCK + n] = (ly - ny * offset) * scale + shadow_centre
+                        s[15 * BLOCK + n] = one / (shadow_z - SHADOW_DEPTH_BIAS)
+                map_first = m * shadow_size * shadow_size
+                for n in range(lanes):
+                    share = s[12 * BLOCK + n]
+                    if share <= zero:
+                        continue
+                    sx, sy, limit = s[13 * BLOCK + n], s[14 * BLOCK + n], s[15 * BLOCK + n]
+                    if one <= sx < shadow_high and one <= sy < shadow_high:
+                        # Mean of 3x3 bilinear depth tests (percentage closer filtering; Reeves, Salesin, Cook 1987):
+                        # 4x4 tests with the weights (1 - f, 1, 1, f) / 3 along each axis. Where the four corners and
+                        # the centre agree, so do the rest.
+                        column, row = np.int64(sx), np.int64(sy)
+                        fu, fv = sx - f32(column), sy - f32(row)
+                        line = np.uint64(map_first + (row - 1) * shadow_size + column - 1)
+                        low = line + u3 * stride
+                        total = lit(shadows[line], limit) + lit(shadows[line + u3], limit)
+                        total += lit(shadows[low], limit) + lit(shadows[low + u3], limit)
+                        total += lit(shadows[line + stride + u1], limit)
+                        if total == zero:
+                            continue
+                        if total < f32(5):
+                            total = zero
+                            for r in range(4):
+                                part = lit(shadows[line], limit) * (one - fu) + lit(shadows[line + u1], limit)
+                                part += lit(shadows[line + u1 + u1], limit) + lit(shadows[line + u3], limit) * fu
+                                total += part * (one - fv if r == 0 else (fv if r == 3 else one))
+                                line += stride
+                            share *= total * f32(1.0 / 9.0)
+                    s[11 * BLOCK + n] += share
+
+            for g in range(groups):
+                for n in range(8 * g, 8 * g + 8):
+                    brightness = s[11 * BLOCK + n]
+                    over = brightness - BRIGHTNESS_KNEE
+                    over = over if over > zero else zero
+                    room = one - BRIGHTNESS_KNEE
+                    brightness = brightness if brightness < BRIGHTNESS_KNEE else BRIGHTNESS_KNEE
+                    s[11 * BLOCK + n] = (brightness + room * over / (over + room)) * f32(256)
+
+            for n in range(count):
+                t = face_of[n]
+                if t < 0:
+                    continue
+                texture = face_texture[np.uint64(t)]
+                size, level = np.int64(texture_size[texture]), np.int64(texture_offset[texture])
+                area = s[2 * BLOCK + n]
+                while area > TEXEL_AREA_MAX and size > 1:
+                    area *= f32(0.25)
+                    level += size * size
+                    size >>= 1
+                u, v = s[n], s[BLOCK + n]
+                # Texel centres lie at half integers of u * size; 8 bits of fraction. size is a power of two, so &
+                # repeats the texture.
+                wide_u = np.int64((u - np.floor(u)) * f32(size << 8)) + (size << 8)
+                wide_v = np.int64((v - np.floor(v)) * f32(size << 8)) + (size << 8)
+                fields = bilinear(texels, level, size, wide_u - 128, wide_v - 128)
+                if area > BLEND_FROM and size > 1:  # between two mip levels
+                    blend = min(np.int64((area - BLEND_FROM) * (f32(256) / (TEXEL_AREA_MAX - BLEND_FROM))), 256)
+                    level += size * size
+                    coarse = bilinear(texels, level, size >> 1, (wide_u >> 1) - 128, (wide_v >> 1) - 128)
+                    fields = ((fields * (256 - blend) + coarse * blend) >> 8) & 0xFF00FF00FF
+                factor = np.int64(s[11 * BLOCK + lane_of[n]])
+                x = x_first + n
+                rgb[y, x, 0] = ((fields & 255) * factor) >> 8
+                rgb[y, x, 1] = (((fields >> 16) & 255) * factor) >> 8
+                rgb[y, x, 2] = (((fields >> 32) & 255) * factor) >> 8

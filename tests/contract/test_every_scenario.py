@@ -1,0 +1,65 @@
+"""What holds for every registered scenario."""
+
+import hashlib
+
+import numpy as np
+import pytest
+
+from scenarios.registry import SCENARIOS
+from scenarios.spec import Scenario, with_overrides
+from scenarios.world import build_simulator
+from sim.records import SimFrame
+
+
+def small(name: str, **overrides: str) -> Scenario:
+    """The scenario at a quarter of its size, for speed."""
+    quarter = {"camera.width": "160", "camera.height": "120", "camera.fx": "133.85", "camera.fy": "134.8"}
+    centre = {"camera.cx": "79.65", "camera.cy": "61.5"}
+    return with_overrides(SCENARIOS[name], {**quarter, **centre, **overrides})
+
+
+def digest(frame: SimFrame) -> str:
+    return hashlib.sha256(frame.rgb.tobytes() + frame.depth_m.tobytes()).hexdigest()
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_a_frame_is_complete_and_the_same_every_time(name: str) -> None:
+    middle = SCENARIOS[name].frames // 2
+    simulator = build_simulator(small(name), "numba", 1)
+    frame = simulator.frame(middle)
+    simulator.frame(0)
+    assert digest(frame) == digest(simulator.frame(middle)), "a frame depends on what was rendered before it"
+    assert digest(frame) == digest(build_simulator(small(name), "numba", 2).frame(middle)), "depends on the threads"
+
+    truth = frame.truth
+    assert np.isfinite(frame.depth_m).all()
+    assert (truth.depth_m > 0).all(), "a hole in the room"
+    np.testing.assert_allclose(truth.T_world_camera[:3, :3] @ truth.T_world_camera[:3, :3].T, np.eye(3), atol=1e-6)
+    for actor in truth.objects:
+        pixels = truth.instance_ids == actor.instance_id
+        assert actor.visible_pixels == np.count_nonzero(pixels)
+        assert 0 <= actor.occlusion <= 1
+        assert actor.is_moving == (actor.surface_speed_m_s > 0.02)
+        assert (actor.ideal_world is None) == (actor.visible_pixels == 0)
+        assert 0 < actor.centre_world[2] < 1.3, f"the centre of {actor.name} is not above the floor"
+        if actor.ideal_world is not None and actor.occlusion < 0.1 and not actor.is_truncated:
+            assert np.linalg.norm(actor.ideal_world - actor.centre_world) < 0.5
+
+
+@pytest.mark.parametrize("name", ["smoke", "fr3_walking_xyz"])
+def test_another_seed_gives_other_bytes(name: str) -> None:
+    one, other = (build_simulator(small(name, seed=seed), "numba", 1).frame(3) for seed in ("0", "1"))
+    assert digest(one) != digest(other)
+
+
+@pytest.mark.parametrize("name", [n for n in SCENARIOS if "walking" in n])
+def test_walking_people_always_move_and_stay_in_the_room(name: str) -> None:
+    simulator = build_simulator(small(name), "numba", 1)
+    people = [a for a in simulator.scene.actors if a.class_name == "person"]
+    assert len(people) == 2
+    for person in people:
+        for time_s in np.linspace(0, SCENARIOS[name].duration_s, 40):
+            x, y, z = person.motion.pose_at(time_s)[:3, 3]
+            assert abs(x) < 3.2
+            assert -2.1 < y < 2.5
+            assert abs(z) < 1e-6

@@ -1,0 +1,358 @@
+"""What must hold for any input, and what the calibrated profile promises, on synthetic RGB-D of walkers and chairs."""
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+from scipy.spatial.transform import Rotation
+
+from dotmask.classification import classify, mask_iou
+from dotmask.evaluation.classification import ClassificationRecord, classification_scores
+from dotmask.evaluation.tracking import chi_square_mean_bounds, normalised_squares
+from dotmask.masking import mask_depth
+from dotmask.profiles import CALIBRATED, PAPER, PROFILES
+from dotmask.records import Detections, Intrinsics, MaskedDepth, Observation, RgbdFrame, Track
+from dotmask.segmentation.selection import select_detections
+from dotmask.tracking.ekf import initiate, update
+from dotmask.tracking.measurement import observe
+from dotmask.tracking.motion_model import predict
+from dotmask.tracking.tracker import TrackerState, track_objects
+
+ONE = Detections(masks=np.ones((1, 2, 2), bool), boxes_px=np.zeros((1, 4)), class_names=("chair",), scores=np.ones(1))
+
+# ---- the filter on its own model ----------------------------------------------------------------
+
+
+def turned(k: int) -> np.ndarray:
+    T = np.eye(4)
+    T[:3, :3] = Rotation.from_rotvec([0.02 * k, 0.3, -0.01 * k]).as_matrix()
+    T[:3, 3] = [0.02 * k, 0.01 * k, 1.0]
+    return T
+
+
+@pytest.mark.parametrize("class_name", ["person", "chair"])
+@pytest.mark.parametrize("profile", PROFILES, ids=lambda p: p.name)
+def test_nees_and_nis_are_consistent_on_the_exact_model(profile, class_name) -> None:
+    """60 runs of 25 frames, drawn from the prior, the motion model and R: means inside their chi-square intervals.
+
+    The interval holds for independent samples: NIS of all frames (innovations are white), NEES of one frame per run.
+    """
+    runs, frames, dt = 60, 25, 1 / 30
+    model = profile.class_model(class_name)
+    R = np.array([[4e-4, 1e-4, 0], [1e-4, 9e-4, 2e-4], [0, 2e-4, 1.6e-3]])
+    accelerations = model.acceleration_sigma_m_s2 * model.axis_shares
+    root = np.linalg.cholesky(R)
+    nees, nis = [], []
+    for seed in range(runs):
+        rng = np.random.default_rng(seed)
+        velocity = rng.normal(0, model.prior_speed_sigma_m_s * model.axis_shares)
+        x = np.concatenate([rng.normal(0, 1, 3), velocity])
+        track = None
+        for k in range(frames):
+            if k:
+                a = rng.normal(0, accelerations)
+                x = np.concatenate([x[:3] + dt * x[3:] + 0.5 * dt**2 * a, x[3:] + dt * a])
+            T = turned(k)
+            z = T[:3, :3].T @ (x[:3] - T[:3, 3]) + root @ rng.normal(size=3)
+            seen = Observation(position_camera=z, covariance=R, class_name=class_name, detection_index=0)
+            if track is None:
+                track = initiate(seen, ONE, 0.0, T, profile, 1)
+            else:
+                track = update(predict(track, k * dt, profile), seen, ONE, T)
+                assert track.innovation is not None
+                nis.append(track.innovation.nis)
+        assert track is not None
+        nees.append(normalised_squares((track.mean - x)[None], track.covariance[None])[0])
+    low, high = chi_square_mean_bounds(3, len(nis), 0.99)
+    assert low < np.mean(nis) < high
+    low, high = chi_square_mean_bounds(6, len(nees), 0.99)
+    assert low < np.mean(nees) < high
+
+
+finite = st.floats(-5, 5)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    positions=st.lists(st.one_of(st.none(), st.tuples(finite, finite, st.floats(0.3, 8))), min_size=2, max_size=12),
+    sigma=st.floats(1e-4, 1.0),
+    dt=st.floats(1e-3, 1.0),
+    angle=finite,
+)
+def test_the_covariance_stays_symmetric_and_positive_definite(positions, sigma, dt, angle) -> None:
+    T = np.eye(4)
+    T[:3, :3] = Rotation.from_rotvec([0.3, angle, -0.2]).as_matrix()
+    start = Observation(
+        position_camera=np.array([0, 0, 2.0]), covariance=sigma**2 * np.eye(3), class_name="person", detection_index=0
+    )
+    track = initiate(start, ONE, 0.0, T, CALIBRATED, 1)
+    for k, position in enumerate(positions):
+        track = predict(track, (k + 1) * dt, CALIBRATED)
+        if position is not None:
+            track = update(track, replace(start, position_camera=np.array(position)), ONE, T)
+        np.testing.assert_array_equal(track.covariance, track.covariance.T)
+        assert np.linalg.eigvalsh(track.covariance).min() > 0
+
+
+# ---- masks --------------------------------------------------------------------------------------
+
+SIZE = (24, 32)
+depths = hnp.arrays(np.float32, SIZE, elements=st.sampled_from([0.0, 0.5, 1.5, 4.0]))
+masks_of_three = hnp.arrays(np.bool_, (3, *SIZE), elements=st.booleans(), fill=st.just(False))
+
+
+def detections_of(masks, scores=None) -> Detections:
+    return Detections(
+        masks=masks,
+        boxes_px=np.array([[i, 0, 20, 20] for i in range(len(masks))], float),
+        class_names=("person",) * len(masks),
+        scores=np.ones(len(masks)) if scores is None else scores,
+    )
+
+
+@settings(max_examples=60, deadline=None)
+@given(depth=depths, masks=masks_of_three, moving=st.lists(st.booleans(), min_size=3, max_size=3))
+def test_masking_only_removes_and_a_second_time_changes_nothing(depth, masks, moving) -> None:
+    detections = detections_of(masks)
+    once = mask_depth(depth, detections, moving, (), CALIBRATED)
+    for image in (once.mo_mdi_m, once.mdi_m):
+        assert ((image == depth) | (image == 0)).all()
+    assert (once.mdi_m <= once.mo_mdi_m).all()
+    assert not once.mdi_m[masks.any(axis=0)].any()
+    again = mask_depth(once.mo_mdi_m, detections, moving, (), CALIBRATED)
+    np.testing.assert_array_equal(again.mo_mdi_m, once.mo_mdi_m)
+    np.testing.assert_array_equal(mask_depth(once.mdi_m, detections, moving, (), CALIBRATED).mdi_m, once.mdi_m)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    depth=depths,
+    masks=masks_of_three,
+    moving=st.lists(st.booleans(), min_size=3, max_size=3),
+    order=st.permutations(range(3)),
+)
+def test_masks_do_not_depend_on_the_order_of_the_detections(depth, masks, moving, order) -> None:
+    one = mask_depth(depth, detections_of(masks), moving, (), PAPER)
+    other = mask_depth(depth, detections_of(masks[order]), [moving[i] for i in order], (), PAPER)
+    np.testing.assert_array_equal(one.mo_mdi_m, other.mo_mdi_m)
+    np.testing.assert_array_equal(one.mdi_m, other.mdi_m)
+
+
+@settings(max_examples=60, deadline=None)
+@given(masks=hnp.arrays(np.bool_, (2, *SIZE)), alignment=st.sampled_from(["none", "box"]))
+def test_iou_lies_between_zero_and_one(masks, alignment) -> None:
+    assert 0.0 <= mask_iou(masks[0], masks[1], alignment) <= 1.0
+
+
+@settings(max_examples=60, deadline=None)
+@given(scores=st.lists(st.sampled_from([0.05, 0.3, 0.5, 0.9]), min_size=1, max_size=14), data=st.data())
+def test_selection_does_not_depend_on_the_order_in_which_a_segmenter_lists(scores, data) -> None:
+    count = len(scores)
+    detections = detections_of(np.zeros((count, 2, 2), bool), np.array(scores))
+    order = data.draw(st.permutations(range(count)))
+    one, other = (select_detections(d, PAPER) for d in (detections, detections.select(order)))
+    np.testing.assert_array_equal(one.boxes_px, other.boxes_px)
+    assert len(one) == min(sum(s >= 0.1 for s in scores), 5)
+    assert (np.diff(one.scores) <= 0).all()
+
+
+# ---- a small world: people and chairs as pictures with depth -----------------------------------------
+
+CAMERA = Intrinsics(width=320, height=240, fx=262.5, fy=262.5, cx=159.5, cy=119.5)
+RATE_HZ = 30
+MOVING_IDS = (1, 2)
+
+
+@dataclass(frozen=True)
+class Picture:
+    """One frame of the small world."""
+
+    frame: RgbdFrame
+    detections: Detections
+    instances: tuple[int, ...]
+    T_world_camera: np.ndarray
+    velocities: dict[int, np.ndarray]
+
+
+def walker(base, direction, phase):
+    """Capsules (end, end, radius) of a person on the spot `base`: trunk, head, legs that swing at the step rate."""
+    up = np.array([0, 0, 1.0])
+    hip, neck = base + 0.9 * up, base + 1.4 * up
+    parts = [(hip, neck, 0.16), (neck + 0.1 * up, neck + 0.2 * up, 0.1)]
+    for half in (0.0, 0.5):
+        swing = 2 * np.pi * (phase + half)
+        thigh = np.deg2rad(25) * np.cos(swing)
+        shank = thigh - np.deg2rad(45) * max(0.0, -np.sin(swing))
+        knee = hip + 0.43 * (np.sin(thigh) * direction - np.cos(thigh) * up)
+        foot = knee + 0.45 * (np.sin(shank) * direction - np.cos(shank) * up)
+        hand = neck - 0.05 * up - 0.6 * (np.sin(0.8 * thigh) * direction + np.cos(0.8 * thigh) * up)
+        parts += [(hip, knee, 0.08), (knee, foot, 0.06), (foot, foot + 0.12 * direction, 0.04), (neck, hand, 0.045)]
+    return parts
+
+
+def chair(base):
+    up, x = np.array([0, 0, 1.0]), np.array([1.0, 0, 0])
+    legs = [(base + s * x, base + s * x + 0.45 * up, 0.03) for s in (-0.22, 0.22)]
+    return [*legs, *((base - 0.2 * x + h * up, base + 0.2 * x + h * up, 0.06) for h in np.linspace(0.45, 0.95, 6))]
+
+
+def picture(index: int, *, walking: bool = True) -> Picture:
+    """Two people walk at 1.2 m/s, one across the chairs and one beside; three chairs stand; the camera moves."""
+    t = index / RATE_HZ
+    T = np.eye(4)
+    T[:3, :3] = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0.0]])  # looks along the world's y
+    T[:3, 3] = [-0.4 + 0.2 * t, 0, 1.2]
+    speed = 1.2 if walking else 0.0
+    velocities = {1: np.array([speed, 0, 0]), 2: speed * np.array([-0.35, 0.94, 0])}
+    velocities |= {i: np.zeros(3) for i in (3, 4, 5)}
+    phase = 0.9 * t * walking
+    bodies = {
+        1: walker(np.array([-1.6, 2.4, 0]) + t * velocities[1], np.array([1.0, 0, 0]), phase),
+        2: walker(np.array([1.1, 2.0, 0]) + t * velocities[2], np.array([-0.35, 0.94, 0]), phase + 0.3),
+        3: chair(np.array([-0.6, 3.2, 0])),
+        4: chair(np.array([0.5, 3.0, 0])),
+        5: chair(np.array([1.5, 4.2, 0])),
+    }
+    depth, ids = np.full((240, 320), 5.5, np.float32), np.zeros((240, 320), np.uint8)
+    strokes = []
+    for instance, parts in bodies.items():
+        for a, b, radius in parts:
+            ends = [T[:3, :3].T @ (p - T[:3, 3]) for p in (a, b)]
+            strokes.append((0.5 * (ends[0][2] + ends[1][2]), instance, ends, radius))
+    for z, instance, ends, radius in sorted(strokes, key=lambda s: -s[0]):
+        line = [
+            (round(16 * (x / d * CAMERA.fx + CAMERA.cx)), round(16 * (y / d * CAMERA.fy + CAMERA.cy)))
+            for x, y, d in ends
+        ]
+        width = max(1, round(2 * radius * CAMERA.fx / z))
+        cv2.line(depth, *line, float(z), width, cv2.LINE_8, 4)
+        cv2.line(ids, *line, instance, width, cv2.LINE_8, 4)
+    rng = np.random.default_rng([17, index])
+    noise = rng.standard_normal(depth.shape, dtype=np.float32)
+    depth = depth + noise * (0.0012 + 0.0019 * (depth - 0.4) ** 2)
+    depth[rng.random(depth.shape) < 0.02] = 0
+    seen = [i for i in bodies if np.count_nonzero(ids == i) > 60]
+    masks = np.array([ids == i for i in seen])
+    boxes = [cv2.boundingRect(m.view(np.uint8)) for m in masks]
+    detections = Detections(
+        masks=masks,
+        boxes_px=np.array([[u, v, u + w - 1, v + h - 1] for u, v, w, h in boxes], float),
+        class_names=tuple("person" if i in MOVING_IDS else "chair" for i in seen),
+        scores=np.array([0.9 - 0.01 * i for i in seen]),
+    )
+    frame = RgbdFrame(
+        index=index,
+        timestamp_s=t,
+        rgb=np.zeros((240, 320, 3), np.uint8),
+        depth_m=depth.astype(np.float32),
+        intrinsics=CAMERA,
+    )
+    return Picture(frame, detections, tuple(seen), T, velocities)
+
+
+@dataclass(frozen=True)
+class Step:
+    """What the method made of one picture; `detections` and `tracks` as it ordered them."""
+
+    detections: Detections
+    tracks: tuple[Track, ...]
+    masked: MaskedDepth
+
+
+def run(pictures, profile, order=None):
+    state, steps = TrackerState(), []
+    for p in pictures:
+        listed = p.detections if order is None else p.detections.select(order(len(p.detections)))
+        detections = select_detections(listed, profile)
+        observations = observe(detections, p.frame, profile)
+        after = track_objects(state, observations, detections, p.frame.timestamp_s, p.T_world_camera, profile)
+        known = {t.track_id: t for t in state.tracks}
+        tracks = tuple(replace(t, verdict=classify(t, known.get(t.track_id), profile)) for t in after.tracks)
+        state = replace(after, tracks=tracks)
+        moving = {t.detection_index for t in tracks if t.verdict is not None and t.verdict.is_moving}
+        flags = [i in moving for i in range(len(detections))]
+        steps.append(Step(detections, tracks, mask_depth(p.frame.depth_m, detections, flags, tracks, profile)))
+    return steps
+
+
+@pytest.fixture(scope="module")
+def pictures():
+    return [picture(k) for k in range(75)]
+
+
+@pytest.fixture(scope="module")
+def calibrated(pictures):
+    return run(pictures, CALIBRATED)
+
+
+def beliefs(pictures, steps):
+    """(frame, instance, track) of every track that was seen."""
+    for k, (p, s) in enumerate(zip(pictures, steps, strict=True)):
+        for track in s.tracks:
+            if track.detection_index is not None:
+                mask = s.detections.masks[track.detection_index]
+                instance = next(i for i, m in zip(p.instances, p.detections.masks, strict=True) if (m == mask).all())
+                yield k, instance, track
+
+
+@pytest.mark.parametrize("instance", MOVING_IDS)
+def test_the_speed_of_a_walking_person_is_known_within_15_cm_per_second(pictures, calibrated, instance) -> None:
+    errors = [
+        np.linalg.norm(track.velocity_world - pictures[k].velocities[instance])
+        for k, i, track in beliefs(pictures, calibrated)
+        if i == instance and track.age_frames > RATE_HZ
+    ]
+    assert len(errors) > 20
+    assert np.sqrt(np.mean(np.square(errors))) < 0.15
+
+
+def test_walkers_are_flagged_and_standing_chairs_are_not(pictures, calibrated) -> None:
+    records = []
+    for k, instance, track in beliefs(pictures, calibrated):
+        assert track.verdict is not None
+        is_new = track.age_frames < CALIBRATED.calm_frames
+        if not is_new:
+            flagged = track.verdict.is_moving
+            moving = instance in MOVING_IDS
+            records.append(ClassificationRecord(frame=k, instance_id=instance, is_moving=moving, is_flagged=flagged))
+    scores = classification_scores(records)
+    assert scores.recall is not None
+    assert scores.precision is not None
+    assert scores.recall >= 0.95
+    assert scores.precision >= 0.9
+
+
+def test_a_walker_is_masked_in_its_first_frame_by_the_calibrated_profile(pictures, calibrated) -> None:
+    first = calibrated[0]
+    person = first.detections.masks[first.detections.class_names.index("person")]
+    assert not first.masked.mo_mdi_m[person].any()
+    kept = run(pictures[:1], PAPER)[0]
+    assert kept.masked.mo_mdi_m[person].any()
+
+
+def test_each_object_keeps_its_track(pictures, calibrated) -> None:
+    owners: dict[int, set[int]] = {}
+    for _, instance, track in beliefs(pictures, calibrated):
+        owners.setdefault(instance, set()).add(track.track_id)
+    assert sum(len(ids) - 1 for ids in owners.values()) <= 1
+
+
+@pytest.mark.parametrize("profile", PROFILES, ids=lambda p: p.name)
+def test_shuffled_detections_leave_the_images_for_slam_unchanged(pictures, profile) -> None:
+    rng = np.random.default_rng(8)
+    straight = run(pictures[:25], profile)
+    shuffled = run(pictures[:25], profile, order=rng.permutation)
+    for one, other in zip(straight, shuffled, strict=True):
+        np.testing.assert_array_equal(one.masked.mo_mdi_m, other.masked.mo_mdi_m)
+        np.testing.assert_array_equal(one.masked.mdi_m, other.masked.mdi_m)
+
+
+def test_people_and_chairs_that_stand_still_end_up_idle() -> None:
+    steps = run([picture(k, walking=False) for k in range(25)], CALIBRATED)
+    settled = [t for t in steps[-1].tracks if t.age_frames > CALIBRATED.calm_frames]
+    assert len(settled) >= 4  # the camera moves: a person slides into the image at the end
+    assert all(t.verdict is not None and not t.verdict.is_moving for t in settled)

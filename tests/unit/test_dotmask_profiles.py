@@ -1,0 +1,54 @@
+from dataclasses import replace
+
+import pytest
+
+from dotmask.errors import ProfileError
+from dotmask.profiles import CALIBRATED, PAPER, PROFILES, profile
+
+
+def test_paper_profile_holds_table_one() -> None:
+    person, chair = PAPER.class_model("person"), PAPER.class_model("chair")
+    assert PAPER.max_misses == 10
+    assert PAPER.score_threshold == 0.1
+    assert PAPER.max_observations == 5
+    assert person.speed_threshold_m_s == 0.01
+    assert chair.speed_threshold_m_s == 0.1
+    assert person.acceleration_sigma_m_s2 == 0.62
+    assert chair.acceleration_sigma_m_s2 == 1.0
+
+
+@pytest.mark.parametrize("each", PROFILES, ids=lambda p: p.name)
+def test_every_profile_knows_the_papers_objects_of_interest(each) -> None:
+    assert [model.name for model in each.classes] == ["person", "chair", "cup", "bottle"]
+    assert [model.name for model in each.classes if model.is_non_rigid] == ["person"]
+    assert profile(each.name) is each
+
+
+def test_unknown_profile_names_the_nearest() -> None:
+    with pytest.raises(ProfileError, match="did you mean 'calibrated'"):
+        profile("calibrate")
+    with pytest.raises(ProfileError, match="choose one of paper, calibrated"):
+        profile("zzz")
+
+
+def test_unknown_class_is_refused() -> None:
+    with pytest.raises(ValueError, match="'dog' is not an object of interest of profile paper"):
+        PAPER.class_model("dog")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"max_misses": 0}, "max_misses must be at least 1"),
+        ({"gate_probability": 1.0}, "probabilities"),
+        ({"dilation_px": -1}, "not be negative"),
+    ],
+)
+def test_values_out_of_range_are_refused(change, message) -> None:
+    with pytest.raises(ValueError, match=message):
+        replace(CALIBRATED, **change)
+
+
+def test_class_model_refuses_a_zero_sigma() -> None:
+    with pytest.raises(ValueError, match="sigmas must be positive"):
+        replace(PAPER.classes[0], acceleration_sigma_m_s2=0.0)

@@ -1,0 +1,291 @@
+import json
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from dotmask.atomic_file import write_atomically
+from dotmask.errors import DotmaskError, SequenceFolderError, TrajectoryFileError
+from dotmask.records import Intrinsics, RgbdFrame, Trajectory
+from dotmask.timestamps import nearest_pairs
+from dotmask.tum import (
+    MAX_DEPTH_M,
+    TumSequenceWriter,
+    format_trajectory,
+    read_intrinsics,
+    read_sequence,
+    read_trajectory,
+    write_trajectory,
+)
+
+CAMERA = Intrinsics(width=8, height=6, fx=7.5, fy=7.25, cx=3.5, cy=2.5)
+
+
+def random_trajectory(seed: int, count: int) -> Trajectory:
+    rng = np.random.default_rng(seed)
+    poses = np.tile(np.eye(4), (count, 1, 1))
+    poses[:, :3, :3] = Rotation.random(count, rng=rng).as_matrix()
+    poses[:, :3, 3] = rng.normal(0, 10, (count, 3))
+    return Trajectory(timestamps_s=1341846313.6 + np.cumsum(rng.uniform(1e-3, 1, count)), T_world_camera=poses)
+
+
+def frame(index: int, rng: np.random.Generator) -> RgbdFrame:
+    depth = (rng.integers(0, 30000, (6, 8)) / 5000).astype(np.float32)
+    return RgbdFrame(
+        index=index,
+        timestamp_s=1000 + index / 30,
+        rgb=rng.integers(0, 256, (6, 8, 3), dtype=np.uint8),
+        depth_m=depth,
+        intrinsics=CAMERA,
+    )
+
+
+def write_example(folder: Path, count: int = 3) -> list[RgbdFrame]:
+    rng = np.random.default_rng(0)
+    frames = [frame(k, rng) for k in range(count)]
+    poses = random_trajectory(1, count).T_world_camera
+    with TumSequenceWriter(folder, CAMERA) as writer:
+        for one, pose in zip(frames, poses, strict=True):
+            writer.write(one, pose)
+    return frames
+
+
+def lines(text: str) -> str:
+    return text.replace("|", "\n")
+
+
+def test_trajectory_comes_back_as_written(tmp_path):
+    trajectory = random_trajectory(0, 50)
+    write_trajectory(tmp_path / "t.txt", trajectory)
+    back = read_trajectory(tmp_path / "t.txt")
+    np.testing.assert_array_equal(back.timestamps_s, trajectory.timestamps_s)
+    np.testing.assert_array_equal(back.T_world_camera[:, :3, 3], trajectory.T_world_camera[:, :3, 3])
+    np.testing.assert_allclose(back.T_world_camera, trajectory.T_world_camera, atol=1e-14)
+
+
+def test_columns_are_those_of_the_benchmark(tmp_path):
+    # A quarter turn about x: quaternion (sin 45°, 0, 0, cos 45°), w last.
+    (tmp_path / "t.txt").write_text("# comment\n\n1.5 1 2 3 0.7071068 0 0 0.7071068\n2.5,4,5,6,0,0,0,2\n")
+    back = read_trajectory(tmp_path / "t.txt")
+    assert back.timestamps_s.tolist() == [1.5, 2.5]
+    assert back.T_world_camera[0, :3, 3].tolist() == [1, 2, 3]
+    np.testing.assert_allclose(back.T_world_camera[0, :3, :3] @ [0, 1, 0], [0, 0, 1], atol=1e-12)
+    np.testing.assert_allclose(back.T_world_camera[1, :3, :3], np.eye(3), atol=1e-12)
+
+
+def test_empty_trajectory_both_ways(tmp_path):
+    empty = Trajectory(timestamps_s=np.zeros(0), T_world_camera=np.zeros((0, 4, 4)))
+    write_trajectory(tmp_path / "t.txt", empty)
+    assert len(read_trajectory(tmp_path / "t.txt")) == 0
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("0 1 2 3 0 0 0 1|# x|1 2 3", "t.txt:3: expected 8 columns"),
+        ("0 1 2 3 0 0 0 1 9", "t.txt:1: expected 8 columns"),
+        ("0 1 2 three 0 0 0 1", "t.txt:1: 'three' is not a number"),
+        ("0 1 2 nan 0 0 0 1", "t.txt:1: 'nan' is not finite"),
+        ("0 1 2 inf 0 0 0 1", "t.txt:1: 'inf' is not finite"),
+        ("1 1 2 3 0 0 0 1|0.5 1 2 3 0 0 0 1", "t.txt:2: time 0.5 is not later"),
+        ("1 1 2 3 0 0 0 1|1 1 2 3 0 0 0 1", "t.txt:2: time 1.0 is not later"),
+        ("1 1 2 3 0 0 0 0", "t.txt:1: quaternion of norm 0"),
+    ],
+)
+def test_broken_trajectory_is_named_with_its_line(tmp_path, content, message):
+    (tmp_path / "t.txt").write_text(lines(content))
+    with pytest.raises(TrajectoryFileError, match=message):
+        read_trajectory(tmp_path / "t.txt")
+
+
+def test_missing_or_binary_trajectory(tmp_path):
+    with pytest.raises(TrajectoryFileError, match="no such file"):
+        read_trajectory(tmp_path / "none.txt")
+    (tmp_path / "t.txt").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(TrajectoryFileError, match="cannot be read as text"):
+        read_trajectory(tmp_path / "t.txt")
+    with pytest.raises(TrajectoryFileError, match="cannot be read as text"):
+        read_trajectory(tmp_path)
+
+
+def test_atomic_write_keeps_the_old_file_when_it_fails(tmp_path, monkeypatch):
+    target = tmp_path / "a.txt"
+    write_atomically(target, "old ü\n")
+    assert target.read_bytes() == "old ü\n".encode()
+
+    def no_space(path: Path, data: bytes) -> int:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", no_space)
+    with pytest.raises(OSError, match="No space"):
+        write_atomically(target, b"new")
+    monkeypatch.undo()
+    assert target.read_text() == "old ü\n"
+    assert [p.name for p in tmp_path.iterdir()] == ["a.txt"]
+    write_atomically(target, b"new")
+    assert target.read_bytes() == b"new"
+
+
+def test_sequence_comes_back_as_written(tmp_path):
+    frames = write_example(tmp_path / "seq")
+    back = list(read_sequence(tmp_path / "seq"))
+    assert len(back) == len(frames)
+    for one, other in zip(frames, back, strict=True):
+        assert other.index == one.index
+        assert other.timestamp_s == pytest.approx(one.timestamp_s, abs=5e-7)
+        assert other.intrinsics == CAMERA
+        np.testing.assert_array_equal(other.rgb, one.rgb)
+        np.testing.assert_allclose(other.depth_m, one.depth_m, atol=1e-6)
+    truth = read_trajectory(tmp_path / "seq" / "groundtruth.txt")
+    assert truth.timestamps_s.tolist() == [one.timestamp_s for one in frames]
+    np.testing.assert_allclose(truth.T_world_camera, random_trajectory(1, 3).T_world_camera, atol=1e-14)
+
+
+def test_sequence_files_are_those_of_the_benchmark(tmp_path):
+    frames = write_example(tmp_path / "seq", 1)
+    root = tmp_path / "seq"
+    assert sorted(p.relative_to(root).as_posix() for p in root.rglob("*") if p.is_file()) == [
+        "associations.txt",
+        "depth.txt",
+        "depth/1000.000000.png",
+        "groundtruth.txt",
+        "intrinsics.json",
+        "rgb.txt",
+        "rgb/1000.000000.png",
+    ]
+    assert (root / "rgb.txt").read_text().splitlines()[-1] == "1000.000000 rgb/1000.000000.png"
+    associated = "1000.000000 rgb/1000.000000.png 1000.000000 depth/1000.000000.png\n"
+    assert (root / "associations.txt").read_text() == associated
+    stored = cv2.imread(str(root / "depth/1000.000000.png"), cv2.IMREAD_UNCHANGED)
+    assert stored.dtype == np.uint16
+    np.testing.assert_array_equal(stored, np.rint(frames[0].depth_m.astype(np.float64) * 5000))
+    bgr = cv2.imread(str(root / "rgb/1000.000000.png"))
+    np.testing.assert_array_equal(bgr[..., ::-1], frames[0].rgb)
+
+
+def test_depth_beyond_sixteen_bits_is_no_return(tmp_path):
+    depth = np.full((6, 8), 13.2, np.float32)
+    depth[0, 0] = MAX_DEPTH_M - 0.001
+    far = RgbdFrame(index=0, timestamp_s=0.0, rgb=np.zeros((6, 8, 3), np.uint8), depth_m=depth, intrinsics=CAMERA)
+    with TumSequenceWriter(tmp_path / "seq", CAMERA) as writer:
+        writer.write(far)
+    (back,) = read_sequence(tmp_path / "seq")
+    assert back.depth_m[0, 0] == pytest.approx(13.106, abs=1e-4)
+    assert np.count_nonzero(back.depth_m) == 1
+    assert not (tmp_path / "seq" / "groundtruth.txt").exists()
+
+
+def test_interrupted_writer_leaves_nothing(tmp_path):
+    def interrupted() -> None:
+        with TumSequenceWriter(tmp_path / "seq", CAMERA) as writer:
+            writer.write(frame(0, np.random.default_rng(0)))
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_writer_refuses_a_folder_with_content_and_takes_an_empty_one(tmp_path):
+    (tmp_path / "empty").mkdir()
+    write_example(tmp_path / "empty")
+    with (
+        pytest.raises(DotmaskError, match="is not an empty folder"),
+        TumSequenceWriter(tmp_path / "empty", CAMERA),
+    ):
+        pass
+    assert len(list(read_sequence(tmp_path / "empty"))) == 3
+
+
+def test_writer_refuses_frames_that_do_not_fit(tmp_path):
+    rng = np.random.default_rng(0)
+    with TumSequenceWriter(tmp_path / "seq", CAMERA) as writer:
+        writer.write(frame(1, rng))
+        with pytest.raises(ValueError, match="not later"):
+            writer.write(frame(1, rng))
+        with pytest.raises(ValueError, match="not finite"):
+            writer.write(frame(2, rng), np.full((4, 4), np.nan))
+    with pytest.raises(SequenceFolderError, match="inside the with block"):
+        writer.write(frame(2, rng))
+
+
+def test_reader_pairs_the_nearest_stamps(tmp_path):
+    write_example(tmp_path / "seq")
+    root = tmp_path / "seq"
+    names = [line.split() for line in (root / "depth.txt").read_text().splitlines()[1:]]
+    # Depth 10 ms late; the last one 30 ms, so that its colour image has no partner.
+    late = [f"{float(t) + (0.03 if k == 2 else 0.01):.6f} {name}" for k, (t, name) in enumerate(names)]
+    (root / "depth.txt").write_text("\n".join(late))
+    assert [round(one.timestamp_s - 1000, 3) for one in read_sequence(root)] == [0.0, 0.033]
+
+
+def test_reader_takes_intrinsics_where_the_folder_has_none(tmp_path):
+    write_example(tmp_path / "seq")
+    assert read_intrinsics(tmp_path / "seq") == CAMERA
+    (tmp_path / "seq" / "intrinsics.json").unlink()
+    with pytest.raises(SequenceFolderError, match="give the intrinsics"):
+        read_sequence(tmp_path / "seq")
+    other = Intrinsics(width=8, height=6, fx=1.0, fy=1.0, cx=0.0, cy=0.0)
+    assert next(read_sequence(tmp_path / "seq", other)).intrinsics == other
+    larger = Intrinsics(width=640, height=480, fx=1.0, fy=1.0, cx=0.0, cy=0.0)
+    with pytest.raises(SequenceFolderError, match=r"8 x 6 pixels, the intrinsics say 640 x 480"):
+        next(read_sequence(tmp_path / "seq", larger))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda root: (root / "rgb.txt").unlink(), "rgb.txt: no such file"),
+        (lambda root: (root / "rgb.txt").write_text("1.0\n"), "rgb.txt:1: expected 2 columns"),
+        (lambda root: (root / "rgb.txt").write_text("5.0 rgb/x.png\n"), "no colour and depth image within"),
+        (lambda root: (root / "rgb/1000.000000.png").unlink(), "cannot be read"),
+        (lambda root: (root / "rgb/1000.000000.png").write_bytes(b""), "is not an image"),
+        (lambda root: (root / "depth/1000.000000.png").write_bytes(b"no"), "is not an image"),
+        (lambda root: cv2.imwrite(str(root / "depth/1000.000000.png"), np.zeros((6, 8), np.uint8)), "16 bits"),
+        (lambda root: cv2.imwrite(str(root / "rgb/1000.000000.png"), np.zeros((6, 8), np.uint8)), "8 bits"),
+        (lambda root: (root / "intrinsics.json").write_text("[]"), "intrinsics.json: cannot be read"),
+        (lambda root: (root / "intrinsics.json").write_text("{}"), "intrinsics.json: cannot be read"),
+    ],
+)
+def test_broken_sequence_is_named(tmp_path, change, message):
+    write_example(tmp_path / "seq")
+    change(tmp_path / "seq")
+    with pytest.raises(SequenceFolderError, match=message):
+        next(read_sequence(tmp_path / "seq"))
+
+
+def test_other_depth_scale_is_refused(tmp_path):
+    write_example(tmp_path / "seq")
+    path = tmp_path / "seq" / "intrinsics.json"
+    path.write_text(json.dumps({**json.loads(path.read_text()), "depth_per_metre": 1000}))
+    with pytest.raises(SequenceFolderError, match="depth_per_metre is 1000"):
+        read_sequence(tmp_path / "seq")
+    with pytest.raises(SequenceFolderError, match="no such folder"):
+        read_sequence(tmp_path / "none")
+
+
+def test_file_has_a_header_and_positive_w():
+    T = np.eye(4)
+    T[:3, :3] = Rotation.from_rotvec([0, 0, -3.0]).as_matrix()
+    text = format_trajectory(Trajectory(timestamps_s=np.array([0.0]), T_world_camera=T[None]))
+    header, line = text.splitlines()
+    assert header == "# timestamp tx ty tz qx qy qz qw"
+    assert float(line.split()[-1]) > 0
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "wanted"),
+    [
+        ([0.0, 1.0, 2.0], [0.01, 1.99], [(0, 0), (2, 1)]),
+        ([0.0], [-0.015, 0.01], [(0, 1)]),
+        ([0.0, 0.03], [0.013], [(0, 0)]),
+        # 0.005 takes 0.006; then 0.015 could only have 0.0, which would cross.
+        ([0.005, 0.015], [0.0, 0.006], [(0, 1)]),
+        ([], [1.0], []),
+        ([0.0], [0.03], []),
+    ],
+)
+def test_nearest_pairs(a, b, wanted):
+    assert [tuple(pair) for pair in nearest_pairs(np.array(a), np.array(b), 0.02).tolist()] == wanted

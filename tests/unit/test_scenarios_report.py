@@ -1,0 +1,114 @@
+import io
+import json
+
+import pytest
+from rich.console import Console
+
+from scenarios.errors import ScenarioError
+from scenarios.report import MethodReport, MocReport, Report, StageTimes, WorldTimes, expectation, table
+
+METHODS = ("unmasked", "dotmask")
+
+
+def method(ate: float | None, **more: object) -> MethodReport:
+    return MethodReport(
+        ate_rmse_m=ate,
+        rpe_trans_rmse_m=0.001,
+        rpe_rot_rmse_rad=0.002,
+        tracked_frames=10,
+        time_ms=StageTimes(odometry=12.0),
+        **more,
+    )
+
+
+REPORT = Report(
+    scenario="smoke",
+    seed=0,
+    frames=10,
+    renderer="numba",
+    segmenter="oracle",
+    slam="embedded",
+    profile="paper",
+    frame_hash="ab" * 32,
+    methods={"unmasked": method(0.2), "dotmask": method(0.0123, moc=MocReport(precision=0.95))},
+    time_ms=WorldTimes(render=20.0),
+)
+
+
+def test_report_json_follows_the_contract() -> None:
+    tree = json.loads(REPORT.to_json())
+    assert list(tree) == [
+        "schema", "scenario", "seed", "frames", "renderer", "segmenter", "slam", "profile", "frame_hash", "methods",
+        "time_ms",
+    ]  # fmt: skip
+    assert tree["schema"] == 1
+    assert tree["time_ms"] == {"render": 20.0}
+    dotmask = tree["methods"]["dotmask"]
+    assert list(dotmask) == [
+        "ate_rmse_m", "rpe_trans_rmse_m", "rpe_rot_rmse_rad", "tracked_frames", "loops", "ekf", "tracking", "moc",
+        "masks", "map", "time_ms",
+    ]  # fmt: skip
+    assert list(dotmask["ekf"]) == ["position_rmse_m", "position_rmse_ideal_m", "velocity_rmse_m_s", "nees", "nis"]
+    assert list(dotmask["tracking"]) == ["mota", "idf1", "hota", "switches"]
+    assert list(dotmask["moc"]) == ["precision", "recall", "flag_latency_frames", "unflag_latency_frames"]
+    assert list(dotmask["masks"]) == ["iou", "leak", "waste"]
+    assert list(dotmask["map"]) == ["ghost_fraction", "accuracy_m", "completeness"]
+    assert list(dotmask["loops"]) == ["count", "trans_error_m", "rot_error_rad"]
+    assert list(dotmask["time_ms"]) == ["segment", "track", "classify", "mask", "odometry", "map"]
+
+
+def test_what_was_not_measured_is_null() -> None:
+    tree = json.loads(REPORT.to_json())["methods"]["unmasked"]
+    assert tree["ekf"]["nees"] is None
+    assert tree["loops"]["count"] is None
+
+
+def test_a_figure_that_is_not_finite_is_refused() -> None:
+    with pytest.raises(ValueError, match="finite"):
+        method(float("nan"))
+
+
+def test_report_json_there_and_back() -> None:
+    assert Report.model_validate_json(REPORT.to_json()) == REPORT
+
+
+@pytest.mark.parametrize(
+    ("text", "holds"),
+    [
+        ("ate_rmse_m<0.02", True),
+        ("dotmask.ate_rmse_m<0.0123", False),
+        ("dotmask.ate_rmse_m<=0.0123", True),
+        ("unmasked.ate_rmse_m > 0.1", True),
+        ("moc.precision>=0.9", True),
+        ("moc.recall>=0", False),  # not measured: never holds
+        ("time_ms.odometry<1e3", True),
+    ],
+)
+def test_expectations(text: str, holds: bool) -> None:
+    assert expectation(text, METHODS).verdict(REPORT)[0] is holds
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("ate_rmse_m", "expected FIGURE<NUMBER"),
+        ("ate<1", "no figure 'ate'; known: ate_rmse_m"),
+        ("moc<1", "name one of moc: precision"),
+        ("ate_rmse_m.x<1", "has no parts"),
+        ("dotmask<1", "name a figure"),
+        ("ate_rmse_m<1e", "is no number"),
+    ],
+)
+def test_bad_expectations_say_what_is_valid(text: str, message: str) -> None:
+    with pytest.raises(ScenarioError, match=message):
+        expectation(text, METHODS)
+
+
+def test_the_table_has_a_row_a_method_and_a_dash_for_what_is_not_there() -> None:
+    console = Console(width=200, file=io.StringIO())
+    console.print(table(REPORT))
+    text = console.file.getvalue()
+    assert "12.3" in text
+    assert "200.0" in text
+    unmasked = next(line for line in text.splitlines() if "unmasked" in line)
+    assert " - " in unmasked

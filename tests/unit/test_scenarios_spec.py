@@ -1,0 +1,71 @@
+import json
+
+import pytest
+
+from scenarios.errors import ScenarioError
+from scenarios.registry import SCENARIOS, scenario
+from scenarios.spec import PersonSpec, Scenario, scenario_from_json, with_overrides
+
+
+def test_an_override_reaches_a_nested_value_and_leaves_the_original() -> None:
+    smoke = scenario("smoke")
+    varied = with_overrides(smoke, {"camera.speed": "2", "people.cast.1.speed_m_s": "1.5", "frames": "7"})
+    assert (varied.camera.speed, varied.people.cast[1].speed_m_s, varied.frames) == (2.0, 1.5, 7)
+    assert smoke.camera.speed == 1.0
+    assert with_overrides(varied, {"camera.speed": "1", "people.cast.1.speed_m_s": "0.9", "frames": "60"}) == smoke
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("camera.sped", "2", r"unknown key 'sped'; valid keys under 'camera': width, height, .*speed"),
+        ("camera.speed.x", "2", r"'camera.speed' has no keys of its own"),
+        ("people.cast.9.speed_m_s", "2", r"unknown key '9'; valid keys under 'people.cast': 0, 1"),
+        ("camera.speed", "fast", r"camera.speed: .*valid number.*'fast'"),
+        ("camera.speed", "0", r"camera.speed: .*greater than 0"),
+        ("camera.speed", "NaN", r"camera.speed: .*finite"),
+        ("frames", "0", r"frames: .*greater than or equal to 1"),
+        ("frames", "2.5", r"frames: .*valid integer"),
+        ("camera.path", "zigzag", r"camera.path: .*'static', 'xyz', 'rpy' or 'halfsphere'"),
+    ],
+)
+def test_a_bad_override_names_the_field_and_what_is_valid(key: str, value: str, message: str) -> None:
+    with pytest.raises(ScenarioError, match=message):
+        with_overrides(scenario("smoke"), {key: value})
+
+
+def test_an_unknown_scenario_names_near_matches() -> None:
+    with pytest.raises(ScenarioError, match=r"unknown scenario 'fr3_walk_xyz'. Did you mean fr3_walking_xyz"):
+        scenario("fr3_walk_xyz")
+
+
+def test_a_walker_needs_two_waypoints() -> None:
+    with pytest.raises(ValueError, match="at least 2 waypoint"):
+        PersonSpec(name="a", character="man", outfit="plaid", waypoints_m=((0, 0),))
+
+
+def test_two_actors_with_one_name_are_refused() -> None:
+    tree = json.loads(scenario("smoke").to_json())
+    tree["chairs"][1]["name"] = tree["chairs"][0]["name"]
+    with pytest.raises(ScenarioError, match="two actors have the same name"):
+        scenario_from_json(json.dumps(tree), "x.json")
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{", '{"name": 3}'])
+def test_a_file_that_is_no_scenario_is_named(text: str) -> None:
+    with pytest.raises(ScenarioError, match=r"x.json: not a scenario"):
+        scenario_from_json(text, "x.json")
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_json_there_and_back(name: str) -> None:
+    assert scenario_from_json(SCENARIOS[name].to_json(), "x") == SCENARIOS[name]
+
+
+def test_a_scenario_is_frozen() -> None:
+    with pytest.raises(ValueError, match="frozen"):
+        scenario("smoke").frames = 3
+
+
+def test_duration_is_from_the_first_to_the_last_frame() -> None:
+    assert Scenario(name="x", description="", frames=31, frame_rate_hz=30).duration_s == 1.0
