@@ -39,7 +39,9 @@ def classify(track: Track, previous: Track | None, profile: Profile) -> Verdict:
     if model.is_non_rigid and previous is not None and previous.misses == 0 and track.misses == 0:
         iou = mask_iou(previous.mask, track.mask, profile.mask_alignment)
 
-    is_fast = speed > model.speed_threshold_m_s
+    # Half hidden, a standing object seems to move when more or less of it shows.
+    is_partial = track.partial_timestamp_s == track.timestamp_s
+    is_fast = speed > model.speed_threshold_m_s * (profile.partial_speed_factor if is_partial else 1.0)
     reason = Reason.IDLE
     if is_fast and _is_significant(track, profile.speed_confidence):
         reason = Reason.SPEED

@@ -115,6 +115,8 @@ class Profile:
         size_memory_s: how long the usual size of a box is remembered after the box has shrunk (calibrated).
         speed_confidence: speed counts as motion only if zero velocity is outside this confidence region of the
             velocity; 0 means the speed alone decides (paper).
+        partial_speed_factor: on the speed threshold while something hides a part of the object; 1 = no difference
+            (calibrated).
         deformation_iou: a non-rigid object whose consecutive masks have an IoU BELOW this is moving. The paper gives no
             value and prints "above": misprint (e).
         mask_alignment: how masks are laid over each other before the IoU: as they are, or with their boxes aligned in
@@ -139,6 +141,7 @@ class Profile:
     size_memory_s: float
     whole_s: float
     speed_confidence: float
+    partial_speed_factor: float
     deformation_iou: float
     mask_alignment: MaskAlignment
     calm_frames: int
@@ -200,6 +203,7 @@ PAPER = Profile(
     size_memory_s=1.0,
     whole_s=0.0,
     speed_confidence=0.0,
+    partial_speed_factor=1.0,
     deformation_iou=0.9,
     mask_alignment="none",
     calm_frames=1,
@@ -249,7 +253,7 @@ CALIBRATED = Profile(
             name="chair",
             acceleration_sigma_m_s2=0.5,
             prior_speed_sigma_m_s=0.5,
-            speed_threshold_m_s=0.1,
+            speed_threshold_m_s=0.15,
             vertical_share=0.2,
             shape_sigma_m=(0.012, 0.012, 0.015),
             extent_m=(0.65, 1.0, 0.65),
@@ -278,7 +282,8 @@ CALIBRATED = Profile(
     jump_share=0.5,
     size_memory_s=3.0,
     whole_s=0.4,
-    speed_confidence=0.95,
+    speed_confidence=0.99,
+    partial_speed_factor=2.0,
     deformation_iou=0.9,
     mask_alignment="box",
     calm_frames=10,

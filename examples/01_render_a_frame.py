@@ -4,11 +4,10 @@ python examples/01_render_a_frame.py [SCENARIO] [FRAME]
 """
 
 import sys
-
-import cv2
+from pathlib import Path
 
 from scenarios.registry import scenario
-from scenarios.video import depth_panel
+from scenarios.video import depth_panel, write_picture
 from scenarios.world import build_simulator
 
 name = sys.argv[1] if len(sys.argv) > 1 else "smoke"
@@ -17,8 +16,8 @@ index = int(sys.argv[2]) if len(sys.argv) > 2 else 30
 simulator = build_simulator(scenario(name), "numba", threads=2)
 frame = simulator.frame(index)  # any frame alone: it does not depend on the others
 
-cv2.imwrite(f"{name}_{index}_colour.png", cv2.cvtColor(frame.rgb, cv2.COLOR_RGB2BGR))
-cv2.imwrite(f"{name}_{index}_depth.png", cv2.cvtColor(depth_panel(frame.depth_m), cv2.COLOR_RGB2BGR))
+write_picture(Path(f"{name}_{index}_colour.png"), frame.rgb)
+write_picture(Path(f"{name}_{index}_depth.png"), depth_panel(frame.depth_m))
 for actor in frame.truth.objects:
     x, y, z = actor.centre_world
     print(

@@ -27,7 +27,7 @@ from scenarios.oracle import OracleSegmenter
 from scenarios.report import Report, WorldTimes
 from scenarios.run_folder import RunFolder, versions
 from scenarios.spec import Scenario
-from scenarios.video import Video
+from scenarios.video import PathsPanel, Video, write_picture
 from scenarios.world import RENDERERS, build_simulator
 from sim.records import SimFrame
 from sim.simulator import Simulator
@@ -162,6 +162,7 @@ def run(scenario: Scenario, settings: RunSettings, out: Path, advance: Callable[
         loops: dict[str, ClosedLoop] = {}
         judges = {name: Judge(name) for name in settings.methods}
         digest, render_seconds = hashlib.sha256(), 0.0
+        paths = PathsPanel(640, 480, settings.methods)
         video = Video(folder.path / "video.mp4", scenario, settings.methods) if settings.video else None
         for timed in rendered_ahead(simulator):
             sim_frame = timed.frame
@@ -179,8 +180,9 @@ def run(scenario: Scenario, settings: RunSettings, out: Path, advance: Callable[
             results = dict(zip(loops, steps, strict=True))
             for name, result in results.items():
                 judges[name].see(sim_frame.truth, result, folder)
+            paths.add(sim_frame, results)
             if video is not None:
-                video.add(sim_frame, results)
+                video.add(sim_frame, results, paths)
             advance()
         if video is not None:
             video.close()
@@ -199,6 +201,7 @@ def run(scenario: Scenario, settings: RunSettings, out: Path, advance: Callable[
         folder.write("trajectory_truth.txt", format_trajectory(judges[settings.methods[0]].truth_trajectory()))
         for name, judge in judges.items():
             folder.write(f"trajectory_{name}.txt", format_trajectory(judge.estimated_trajectory()))
+        write_picture(folder.path / "trajectories.png", paths.draw())
         folder.write("versions.json", json.dumps(versions(), indent=2) + "\n")
         folder.write("report.json", report.to_json())
     return report

@@ -97,6 +97,13 @@ class PathsPanel:
         return image
 
 
+def write_picture(path: Path, picture: Picture) -> None:
+    """Write `picture` as a PNG file."""
+    done, encoded = cv2.imencode(".png", cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))
+    assert done
+    path.write_bytes(encoded.tobytes())
+
+
 def mosaic(panels: list[tuple[str, Picture]]) -> Picture:
     """Four titled panels of one size, two by two."""
     for title, panel in panels:
@@ -115,16 +122,14 @@ class Video:
     def __init__(self, path: Path, scenario: Scenario, methods: tuple[str, ...]) -> None:
         width, height = scenario.camera.width, scenario.camera.height
         self._shown = "dotmask" if "dotmask" in methods else methods[-1]
-        self._paths = PathsPanel(width, height, methods)
         self._size = (3 * width // 2, 3 * height // 2)
         self._writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), scenario.frame_rate_hz, self._size)
         if not self._writer.isOpened():
             raise ScenarioError("--video: this build of OpenCV cannot write mp4 files; run without --video")
 
-    def add(self, frame: SimFrame, results: Mapping[str, FrameResult]) -> None:
-        """Append one frame."""
-        self._paths.add(frame, results)
-        picture = frame_picture(frame, results[self._shown], self._paths)
+    def add(self, frame: SimFrame, results: Mapping[str, FrameResult], paths: PathsPanel) -> None:
+        """Append one frame; `paths` holds the positions up to it."""
+        picture = frame_picture(frame, results[self._shown], paths)
         smaller = cv2.resize(picture, self._size, interpolation=cv2.INTER_AREA)
         self._writer.write(cv2.cvtColor(smaller, cv2.COLOR_RGB2BGR))
 
@@ -141,6 +146,6 @@ def frame_picture(frame: SimFrame, result: FrameResult, paths: PathsPanel) -> Pi
             ("red: moving, green: idle", colour_panel(frame, result)),
             ("MO-MDI, to odometry", depth_panel(masked.mo_mdi_m)),
             ("MDI, to the map", depth_panel(masked.mdi_m)),
-            ("", paths.draw()),
+            ("", np.asarray(cv2.resize(paths.draw(), frame.rgb.shape[1::-1], interpolation=cv2.INTER_AREA), np.uint8)),
         ]
     )

@@ -29,7 +29,7 @@ def track(speed, class_name="person", mask=STANDING, sigma_v=0.02, misses=0, ver
         detection_index=0 if misses == 0 else None,
         mask=mask,
         mask_timestamp_s=1.0,
-        partial_timestamp_s=1.0,
+        partial_timestamp_s=0.0,
         verdict=verdict,
     )
 
@@ -148,3 +148,11 @@ def test_aligned_iou_forgives_shift_and_scale_where_the_plain_one_does_not(scale
     large = ((u - 80) / (width / 2)) ** 2 + ((v - 60) / (height / 2)) ** 2 <= 1
     assert mask_iou(small, large, "box") > 0.94
     assert mask_iou(small, large, "none") < 0.3
+
+
+def test_half_hidden_a_standing_object_needs_more_speed_to_count_as_moving() -> None:
+    threshold = CALIBRATED.class_model("chair").speed_threshold_m_s
+    before, slow = track(0.0, "chair", verdict=idle()), track(1.4 * threshold, "chair", sigma_v=0.01)
+    assert classify(slow, before, CALIBRATED).reason is Reason.SPEED
+    half_hidden = replace(slow, partial_timestamp_s=slow.timestamp_s)
+    assert classify(half_hidden, before, CALIBRATED).reason is Reason.IDLE
