@@ -10,7 +10,7 @@ demo: $(VENV)/.installed  ## install and run the whole way once: about four minu
 	$(BIN)/dotmask run fr3_walking_xyz --out runs/demo-$$(date +%Y%m%d-%H%M%S)
 
 test: $(VENV)/.installed-dev  ## install and run all tests
-	$(BIN)/python -m pytest --cov --cov-report=term --cov-fail-under=85 $(PYTEST_ARGS)
+	$(BIN)/python -m pytest -n auto --dist loadfile --cov --cov-report=term --cov-fail-under=85 $(PYTEST_ARGS)
 
 lint: $(VENV)/.installed-dev  ## style, types, dependency rule, spelling
 	$(BIN)/ruff check .

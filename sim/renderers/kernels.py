@@ -153,6 +153,10 @@ def rasterise(
             if right < low_x or left > high_x or bottom < low_y or top > high_y:
                 continue
             is_small = bottom - top < SMALL_BOX and right - left < SMALL_BOX  # whatever the band of rows
+            edge_bu, edge_bv, edge_gu, edge_gv = ub - ua, vb - va, ug - ua, vg - va
+            doubled = edge_bv * edge_gu - edge_bu * edge_gv
+            if is_small and doubled <= zero:  # from behind or edge-on
+                continue
             top, left = max(top - pad, f32(row_first)), max(left - pad, f32(0))
             y_first, y_last = int(np.ceil(top)), int(np.floor(min(bottom + pad, f32(row_last - 1)))) + 1
             x_first, x_last = int(np.ceil(left)), int(np.floor(min(right + pad, f32(width - 1)))) + 1
@@ -161,34 +165,32 @@ def rasterise(
             if is_small:
                 # Most triangles of a body. Flat edge functions, and 1/z as a convex sum, affine on the screen. Edges
                 # are pushed out by SMALL_MARGIN, so that no crack opens to a neighbour drawn by the exact rule below.
-                edge_bu, edge_bv, edge_gu, edge_gv = ub - ua, vb - va, ug - ua, vg - va
-                doubled = edge_bv * edge_gu - edge_bu * edge_gv
-                if doubled <= zero:  # from behind or edge-on
-                    continue
                 wa, wb, wg = camera[i, 5], camera[j, 5], camera[k, 5]
                 number = np.int32(t)
                 margin_b = SMALL_MARGIN * (abs(edge_gu) + abs(edge_gv))
                 margin_g = SMALL_MARGIN * (abs(edge_bu) + abs(edge_bv))
                 margin_a = SMALL_MARGIN * (abs(edge_gu - edge_bu) + abs(edge_gv - edge_bv))
                 scale = one / doubled
+                slope_b, slope_g = scale * (wb - wa), scale * (wg - wa)
+                low_b, low_g, low_a = -margin_b, -margin_g, -margin_a
+                w_low, w_high = min(wa, wb, wg), max(wa, wb, wg)
                 for y in range(y_first, y_last):
-                    dv = f32(y) - va
-                    for x in range(x_first, x_last):
-                        du = f32(x) - ua
-                        weight_b = dv * edge_gu - du * edge_gv
-                        weight_g = du * edge_bv - dv * edge_bu
-                        weight_a = doubled - weight_b - weight_g
-                        if weight_a < -margin_a or weight_b < -margin_b or weight_g < -margin_g:
-                            continue
-                        weight_b = min(max(weight_b * scale, zero), one)
-                        weight_g = min(max(weight_g * scale, zero), one - weight_b)
-                        w = wa + weight_b * (wb - wa) + weight_g * (wg - wa)
-                        n = np.uint64(y * width + x)
-                        if bit:
-                            flat_c[n] |= bit
-                        if w > flat_w[n]:
-                            flat_w[n] = w
-                            flat_t[n] = number
+                    dv, du = f32(y) - va, f32(x_first) - ua
+                    weight_b = dv * edge_gu - du * edge_gv
+                    weight_g = du * edge_bv - dv * edge_bu
+                    n = np.uint64(y * width + x_first)
+                    for _ in range(x_first, x_last):
+                        if weight_b >= low_b and weight_g >= low_g and doubled - weight_b - weight_g >= low_a:
+                            # The margins must not lead out of the range of the corners.
+                            w = min(max(wa + weight_b * slope_b + weight_g * slope_g, w_low), w_high)
+                            if bit:
+                                flat_c[n] |= bit
+                            if w > flat_w[n]:
+                                flat_w[n] = w
+                                flat_t[n] = number
+                        weight_b -= edge_gv
+                        weight_g += edge_bv
+                        n += np.uint64(1)
                 continue
 
         ax, ay, az = np.float64(camera[i, 0]), np.float64(camera[i, 1]), np.float64(za)

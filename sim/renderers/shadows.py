@@ -12,8 +12,8 @@ import numpy.typing as npt
 from sim.geometry import FloatArray
 from sim.renderers import kernels, shading_kernels
 
-CASTER_CELL_M = 0.02
-"""Vertices of an actor in one cell of this size, with normals in one octant, cast their shadow as one vertex."""
+CASTER_CELL_M = 0.03
+"""Vertices of an actor in one cell of this size cast their shadow as one vertex."""
 
 Float32Array = npt.NDArray[np.float32]
 FaceArray = npt.NDArray[np.uint32]
@@ -38,14 +38,37 @@ def project(
     kernels.project(attributes, R32, t32, fx, fy, cx, cy, np.float32(near), camera)
 
 
+def screen_box(camera: Float32Array, near: float, width: int, height: int) -> tuple[int, int, int, int]:
+    """First row, last + 1, first column, last + 1 of the pixels that a mesh can cover; empty: first = last.
+
+    Args:
+        camera: (n, 6) its vertices as `kernels.project` leaves them.
+        near: what is closer is not drawn. A mesh that reaches through there can cover every pixel.
+        width: of the image, pixels.
+        height: of the image, pixels.
+    """
+    if not len(camera):
+        return 0, 0, 0, 0
+    z, u, v = np.ascontiguousarray(camera[:, 2:5].T)  # contiguous: a reduction over columns is many times slower
+    if z.max() < near:
+        return 0, 0, 0, 0
+    if z.min() < near:
+        return 0, height, 0, width
+    # A pixel to each side: rasterisation rounds in another way than `kernels.project`.
+    left, right = (min(max(int(edge), 0), width) for edge in (np.floor(u.min()) - 1, np.ceil(u.max()) + 2))
+    top, bottom = (min(max(int(edge), 0), height) for edge in (np.floor(v.min()) - 1, np.ceil(v.max()) + 2))
+    return (top, bottom, left, right) if top < bottom and left < right else (0, 0, 0, 0)
+
+
 def simplified(
-    vertices: Float32Array, normals: Float32Array, faces: FaceArray, groups: npt.NDArray[np.int32]
+    vertices: Float32Array, faces: FaceArray, groups: npt.NDArray[np.int32]
 ) -> tuple[npt.NDArray[np.int64], FaceArray]:
     """A coarser mesh by vertex clustering (Rossignac and Borrel, "Multi-resolution 3D approximations", 1993).
 
+    The two sides of a thin sheet may fall together; both stay, and the one that faces the light casts the shadow.
+
     Args:
         vertices: (n, 3) at rest, metres.
-        normals: (n, 3) at rest; the two sides of a thin sheet stay apart.
         faces: (m, 3).
         groups: (n,) a number per vertex; vertices of different groups stay apart.
 
@@ -55,8 +78,7 @@ def simplified(
     if not len(faces):
         return np.zeros(0, np.int64), np.zeros((0, 3), np.uint32)
     cells = np.floor(vertices / np.float32(CASTER_CELL_M)).astype(np.int64)
-    octant = (normals > 0).astype(np.int64)
-    keys = np.column_stack([groups, cells, octant])
+    keys = np.column_stack([groups, cells])
     _, first, cluster = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     coarse = cluster.reshape(-1)[faces.astype(np.int64)]
     distinct = (coarse[:, 0] != coarse[:, 1]) & (coarse[:, 1] != coarse[:, 2]) & (coarse[:, 2] != coarse[:, 0])
@@ -82,42 +104,58 @@ class ShadowMaps:
         self._numbers = np.zeros((size, size), np.int32)
         self._coverage = np.zeros((size, size), np.uint32)
         self.maps = np.zeros((len(lights), size, size), np.float32)
+        # The box of each map (first row, last + 1, first column, last + 1) where `maps` is not `_static`.
+        self._changed = [(0, size, 0, size)] * len(lights)
 
     def draw_static(self, attributes: Float32Array, faces: FaceArray) -> None:
         """Draw what never moves; `attributes` (n, 8) as `kernels.pose_vertices` leaves them."""
-        self._draw(self._static, attributes, faces)
+        camera = np.zeros((len(attributes), 6), np.float32)
+        for light, target in zip(self._lights, self._static, strict=True):
+            self._draw(light, target, attributes, faces, camera)
+        np.copyto(self.maps, self._static)
 
     def draw(self, attributes: Float32Array, faces: FaceArray) -> None:
         """Make `maps` anew: the static part, and `faces` over it."""
-        if self._size:
-            np.copyto(self.maps, self._static)
-            self._draw(self.maps, attributes, faces)
+        camera = np.zeros((len(attributes), 6), np.float32)
+        for number, (light, target) in enumerate(zip(self._lights, self.maps, strict=True)):
+            top, bottom, left, right = self._changed[number]
+            target[top:bottom, left:right] = self._static[number, top:bottom, left:right]
+            self._changed[number] = self._draw(light, target, attributes, faces, camera)
 
-    def _draw(self, targets: Float32Array, attributes: Float32Array, faces: FaceArray) -> None:
-        if not self._size:
-            return
+    def _draw(
+        self,
+        light: Float32Array,
+        target: Float32Array,
+        attributes: Float32Array,
+        faces: FaceArray,
+        camera: Float32Array,
+    ) -> tuple[int, int, int, int]:
+        """Draw into one map, and return the box of it that can have changed."""
+        if not self._size or not len(faces):
+            return 0, 0, 0, 0
         focal, centre = self._size * 0.5 / shading_kernels.SHADOW_TANGENT, (self._size - 1) * 0.5
         lens, near = (focal, focal, centre, centre), float(shading_kernels.SHADOW_NEAR)
-        camera = np.zeros((len(attributes), 6), np.float32)
-        for light, target in zip(self._lights, targets, strict=True):
-            T_world_light = np.diag([1.0, -1.0, -1.0, 1.0])  # x right, y "down" = -y of the world, looks along -z
-            T_world_light[:3, 3] = light[:3]
-            project(attributes, T_world_light, lens, near, camera)
+        T_world_light = np.diag([1.0, -1.0, -1.0, 1.0])  # x right, y "down" = -y of the world, looks along -z
+        T_world_light[:3, 3] = light[:3]
+        project(attributes, T_world_light, lens, near, camera)
+        top, bottom, left, right = screen_box(camera, near, self._size, self._size)
 
-            def draw(first: int, last: int, target: Float32Array = target) -> None:
-                kernels.rasterise(
-                    camera,
-                    faces,
-                    0,
-                    len(faces),
-                    *lens,
-                    first,
-                    last,
-                    near,
-                    target,
-                    self._numbers,
-                    self._coverage,
-                    np.uint32(0),
-                )
+        def draw(first: int, last: int) -> None:
+            kernels.rasterise(
+                camera,
+                faces,
+                0,
+                len(faces),
+                *lens,
+                max(first, top),
+                min(last, bottom),
+                near,
+                target,
+                self._numbers,
+                self._coverage,
+                np.uint32(0),
+            )
 
+        if top < bottom:
             self._in_bands(draw, self._size)
+        return top, bottom, left, right

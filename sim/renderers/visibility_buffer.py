@@ -18,7 +18,7 @@ import numpy.typing as npt
 from sim.geometry import FloatArray
 from sim.records import CameraModel, RenderedImages
 from sim.renderers import kernels, shading_kernels
-from sim.renderers.shadows import ShadowMaps, project, simplified
+from sim.renderers.shadows import ShadowMaps, project, screen_box, simplified
 from sim.renderers.textures import TextureAtlas
 from sim.scene import Scene, SceneObject, Surface
 
@@ -97,20 +97,23 @@ class VisibilityBufferRenderer:
         shape = (camera.height, camera.width)
         rgb, depth_m = np.empty((*shape, 3), np.uint8), np.empty(shape, np.float32)
         ids = np.empty(shape, np.uint16)
+        boxes = [screen_box(self._camera[slice(*a.vertices)], NEAR_M, *shape[::-1]) for a in self._actors.values()]
+        parts = [((0, self._static_faces), (0, camera.height), np.uint32(0))]
+        parts += [(a.faces, box[:2], a.bit) for a, box in zip(self._actors.values(), boxes, strict=True) if any(box)]
 
         def draw(first: int, last: int) -> None:
             self._inverse_depth[first:last] = 0
             self._triangles[first:last] = -1
             self._coverage[first:last] = 0
-            for (face_first, face_last), bit in self._batches:
+            for (face_first, face_last), (top, bottom), bit in parts:
                 kernels.rasterise(
                     self._camera,
                     self._faces,
                     face_first,
                     face_last,
                     *lens,
-                    first,
-                    last,
+                    max(first, top),
+                    min(last, bottom),
                     NEAR_M,
                     self._inverse_depth,
                     self._triangles,
@@ -218,7 +221,6 @@ class VisibilityBufferRenderer:
         self._attributes[:, 6:] = joined("uv", np.float32, 2)
         self._camera = np.zeros((vertex, 6), np.float32)  # x, y, z, u, v, 1/z
         self._pose(0, vertex)
-        self._batches = [((0, self._static_faces), np.uint32(0)), *((a.faces, a.bit) for a in self._actors.values())]
 
     def _build_shadow_casters(self) -> None:
         """Draw the static shadows, and simplify the actors for theirs."""
@@ -228,7 +230,7 @@ class VisibilityBufferRenderer:
         for number, actor in enumerate(self._actors.values()):
             groups[actor.vertices[0] - first : actor.vertices[1] - first] = number
         faces = self._faces[self._static_faces :] - np.uint32(first)
-        kept, self._caster_faces = simplified(self._rest[first:], self._rest_normals[first:], faces, groups)
+        kept, self._caster_faces = simplified(self._rest[first:], faces, groups)
         self._caster_vertices = kept + first
 
     def _pose(self, first: int, last: int) -> None:

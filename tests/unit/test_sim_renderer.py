@@ -12,7 +12,7 @@ import pytest
 
 from sim.geometry import FloatArray, look_at, pose, rotation_z
 from sim.records import CameraModel, RenderedImages
-from sim.renderers.shadows import simplified
+from sim.renderers.shadows import screen_box, simplified
 from sim.renderers.textures import TextureAtlas
 from sim.renderers.visibility_buffer import NEAR_M, VisibilityBufferRenderer
 from sim.scene import Light, Placed, Scene, SceneObject, Surface
@@ -424,7 +424,7 @@ def test_shadow_casters_are_coarse_and_keep_their_winding() -> None:
     number = np.arange(len(normals), dtype=np.uint32).reshape(phi.shape)
     a, b, c, d = (x.ravel() for x in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]))
     faces = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
-    kept, coarse = simplified(np.float32(0.15) * normals, normals, faces, np.zeros(len(normals), np.int32))
+    kept, coarse = simplified(np.float32(0.15) * normals, faces, np.zeros(len(normals), np.int32))
     assert len(coarse) < len(faces) / 2
     points = normals[kept].astype(float)
     p, q, r = (points[coarse[:, k]] for k in range(3))
@@ -432,6 +432,21 @@ def test_shadow_casters_are_coarse_and_keep_their_winding() -> None:
     assert (outward > -1e-6).mean() > 0.95
     volume = (np.cross(p, q) * r).sum() / 6
     assert 0.9 < volume / (4 / 3 * np.pi) < 1.01  # still closed
+
+
+def test_the_box_of_a_mesh_holds_its_pixels() -> None:
+    inside = np.array([[0, 0, 2.0, 20.4, 30.6, 0.5], [0, 0, 3.0, 40.2, 35.0, 0.33]], np.float32)
+    assert screen_box(inside, NEAR_M, 160, 120) == (29, 37, 19, 43)
+    assert screen_box(inside + np.array([0, 0, 0, 500, 0, 0], np.float32), NEAR_M, 160, 120) == (
+        0,
+        0,
+        0,
+        0,
+    )  # beside the image
+    assert screen_box(inside * np.array([1, 1, -1, 1, 1, 1], np.float32), NEAR_M, 160, 120) == (0, 0, 0, 0)  # behind
+    reaching_through = inside * np.array([[1, 1, -1, 1, 1, 1], [1, 1, 1, 1, 1, 1]], np.float32)
+    assert screen_box(reaching_through, NEAR_M, 160, 120) == (0, 120, 0, 160)
+    assert screen_box(inside[:0], NEAR_M, 160, 120) == (0, 0, 0, 0)
 
 
 def test_mip_levels_are_means() -> None:
