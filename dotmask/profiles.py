@@ -245,7 +245,7 @@ CALIBRATED = Profile(
             speed_threshold_m_s=0.1,
             vertical_share=0.2,
             is_non_rigid=True,
-            shape_sigma_m=(0.04, 0.025, 0.03),
+            shape_sigma_m=(0.08, 0.03, 0.06),
             extent_m=(0.6, 1.7, 0.5),
             size_play=(0.5, 0.1),
         ),

@@ -163,10 +163,10 @@ def test_a_folder_with_other_files_is_refused_and_left_alone(verb: str, tmp_path
 
 
 BAD_RECORDINGS = {
-    "nan": ("0 0 0 1 0 0 0 1\n1 nan 0 1 0 0 0 1\n", ":2"),
-    "unsorted": ("0 0 0 1 0 0 0 1\n2 0 0 1 0 0 0 1\n1 0 0 1 0 0 0 1\n", ":3"),
-    "columns": ("0 0 0 1 0 0 0\n", ":1"),
-    "too short": ("0 0 0 1 0 0 0 1\n0.5 0 0 1 0 0 0 1\n", "0.5"),
+    "nan": ("0 0 0 1 -1 0 0 1\n1 nan 0 1 -1 0 0 1\n", "line 2"),
+    "unsorted": ("0 0 0 1 -1 0 0 1\n2 0 0 1 -1 0 0 1\n1 0 0 1 -1 0 0 1\n", "line 3"),
+    "columns": ("0 0 0 1 -1 0 0\n", "line 1"),
+    "too short": ("0 0 0 1 -1 0 0 1\n0.5 0 0 1 -1 0 0 1\n", "lasts 0.50 s"),
 }
 
 

@@ -17,15 +17,15 @@ pytestmark = pytest.mark.acceptance
 @pytest.fixture(scope="module")
 def walking_xyz(tmp_path_factory: pytest.TempPathFactory) -> Report:
     out = tmp_path_factory.mktemp("runs") / "xyz"
-    first_ten_seconds = with_overrides(scenario("fr3_walking_xyz"), {"frames": "300"})
-    return run(first_ten_seconds, RunSettings.parse(), out, lambda: None)
+    first_half = with_overrides(scenario("fr3_walking_xyz"), {"frames": "450"})
+    return run(first_half, RunSettings.parse(), out, lambda: None)
 
 
 def test_masking_saves_odometry(walking_xyz: Report) -> None:
     methods = walking_xyz.methods
     assert methods["dotmask"].ate_rmse_m < 0.02
     assert methods["unmasked"].ate_rmse_m > 5 * methods["dotmask"].ate_rmse_m
-    assert methods["dotmask"].tracked_frames == 300
+    assert methods["dotmask"].tracked_frames == 450
 
 
 def test_the_classification_finds_what_moves(walking_xyz: Report) -> None:
@@ -42,13 +42,18 @@ def test_almost_nothing_that_moves_reaches_odometry(walking_xyz: Report) -> None
 
 def test_the_speed_of_a_walking_person_is_known_after_a_second(tmp_path: Path) -> None:
     walker = PersonSpec(
-        name="walker", character="man", outfit="plaid", speed_m_s=1.2, waypoints_m=((-1.3, 0.9), (1.6, 0.9), (1.6, 1.4))
+        name="walker",
+        character="man",
+        outfit="plaid",
+        speed_m_s=1.2,
+        start_m=1.3,
+        waypoints_m=((-2.9, 0.75), (2.6, 0.75), (2.6, -0.2), (-2.9, -0.2)),
     )
     stage = Scenario(
         name="one_walker",
         description="One person walks past a camera that moves.",
-        frames=72,
-        camera=CameraSpec(path="xyz", position_m=(0.0, -2.2, 1.3)),
+        frames=75,
+        camera=CameraSpec(path="xyz", amplitude=0.5, position_m=(0.0, -2.5, 1.7), tilt_deg=12),
         people=PeopleSpec(cast=(walker,)),
     )
     run(stage, RunSettings.parse(methods="dotmask"), tmp_path / "walker", lambda: None)
@@ -57,7 +62,6 @@ def test_the_speed_of_a_walking_person_is_known_after_a_second(tmp_path: Path) -
     assert len(rows) > 30
     speeds = np.array([[float(row[f"v{axis}_m_s"]) for axis in "xyz"] for row in rows])
     truth = np.array([[float(row[f"true_v{axis}_m_s"]) for axis in "xyz"] for row in rows])
-    true_speed = np.linalg.norm(truth, axis=1)
-    assert true_speed.mean() == pytest.approx(1.2, abs=0.08)
-    error = np.linalg.norm(speeds, axis=1) - true_speed
-    assert np.sqrt(np.mean(error**2)) < 0.15
+    # The centre of a walking body speeds up and slows down by 0.15 m/s with every step, about the speed of the walk.
+    assert np.linalg.norm(truth, axis=1).mean() == pytest.approx(1.2, abs=0.05)
+    assert np.sqrt(np.mean((np.linalg.norm(speeds, axis=1) - 1.2) ** 2)) < 0.15
