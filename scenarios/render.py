@@ -18,7 +18,9 @@ from scenarios.world import build_simulator
 
 
 def render_sequence(scenario: Scenario, out: Path, renderer: str, threads: int, advance: Callable[[], None]) -> None:
-    """Write the sequence folder `out`: the TUM layout, and beside it
+    """Write the sequence folder `out` in the TUM layout.
+
+    Beside the images and `groundtruth.txt` it holds the rest of the truth:
 
     - `masks/STAMP.png`: 16-bit instance ids, 0 = background, listed in `masks.txt`;
     - `objects.json`: name, class and instance id of every actor;
@@ -34,7 +36,7 @@ def render_sequence(scenario: Scenario, out: Path, renderer: str, threads: int, 
 
     Raises:
         ScenarioError, SimError, DotmaskError: bad input; nothing is left in `out`.
-    """  # noqa: D415 - the list belongs to the sentence
+    """
     check_free(out)
     simulator = build_simulator(scenario, renderer, threads)
     poses = defaultdict(list)

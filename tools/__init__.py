@@ -1,0 +1,1 @@
+"""Scripts that made the assets. Not installed, and not run by the tests."""
