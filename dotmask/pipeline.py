@@ -12,7 +12,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Literal, Protocol
+from typing import Protocol
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -20,13 +20,11 @@ from scipy.spatial.transform import Rotation
 from dotmask.classification import classify
 from dotmask.interfaces import Segmenter, SlamBackend
 from dotmask.masking import mask_depth
-from dotmask.profiles import Profile
+from dotmask.profiles import PoseFeedback, Profile
 from dotmask.records import Detections, FloatArray, MaskedDepth, Observation, PoseEstimate, RgbdFrame, Track
 from dotmask.segmentation.selection import select_detections
 from dotmask.tracking.measurement import observe
 from dotmask.tracking.tracker import TrackerState, track_objects
-
-PoseFeedback = Literal["previous", "constant_velocity", "refined"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

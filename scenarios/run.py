@@ -14,8 +14,8 @@ from typing import cast, get_args
 import cv2
 
 from dotmask.interfaces import Segmenter
-from dotmask.pipeline import ClosedLoop, DotMask, FrontEnd, MaskAll, PoseFeedback, Unmasked
-from dotmask.profiles import Profile
+from dotmask.pipeline import ClosedLoop, DotMask, FrontEnd, MaskAll, Unmasked
+from dotmask.profiles import PoseFeedback, Profile
 from dotmask.profiles import profile as get_profile
 from dotmask.records import FloatArray, RgbdFrame
 from dotmask.slam.embedded import EmbeddedSlam

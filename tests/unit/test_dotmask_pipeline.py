@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from dotmask.pipeline import ClosedLoop, DotMask, MaskAll, PoseFeedback, Unmasked, extrapolate
-from dotmask.profiles import profile
+from dotmask.pipeline import ClosedLoop, DotMask, MaskAll, Unmasked, extrapolate
+from dotmask.profiles import PoseFeedback, profile
 from dotmask.records import Detections, FloatArray, Intrinsics, MaskedDepth, PoseEstimate, RgbdFrame, SlamStatus
 
 CAMERA = Intrinsics(width=160, height=120, fx=130.0, fy=130.0, cx=79.5, cy=59.5)
