@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 HERE = Path(__file__).parent
-_spec = importlib.util.spec_from_file_location("golden_values", HERE / "golden_values.py")
-golden_values = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(golden_values)
+_spec = importlib.util.spec_from_file_location("regenerate", HERE / "regenerate.py")
+regenerate = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(regenerate)
 
 
 def stored(name: str) -> dict:
@@ -20,7 +20,7 @@ def stored(name: str) -> dict:
 
 
 def test_a_frame_looks_as_it_did() -> None:
-    expected, measured = stored("smoke_frame"), golden_values.frame_statistics()
+    expected, measured = stored("smoke_frame"), regenerate.frame_statistics()
     # Half a grey level and a few pixels: what another version of a library may change without anybody seeing it.
     assert measured["mean_rgb"] == pytest.approx(expected["mean_rgb"], abs=0.5)
     assert measured["depth_quartiles_m"] == pytest.approx(expected["depth_quartiles_m"], abs=0.005)
@@ -29,4 +29,4 @@ def test_a_frame_looks_as_it_did() -> None:
 
 
 def test_trajectory_errors_are_as_they_were() -> None:
-    assert golden_values.trajectory_figures() == pytest.approx(stored("trajectory"), rel=1e-9)
+    assert regenerate.trajectory_figures() == pytest.approx(stored("trajectory"), rel=1e-9)
