@@ -1,4 +1,4 @@
-"""Command line: `python -m tools.bake_humans [man woman] [--out assets]`, from the root of the repository."""
+"""Command line: `python -m tools.bake_humans [NAME ...] [--out assets]`, from the root of the repository."""
 
 import argparse
 import time
@@ -18,6 +18,9 @@ from tools.bake_humans.styles import STYLES, Outfit, Style
 from tools.bake_humans.texture import bake_map, fill, unwrap
 
 SIZES = {"skin": 1024, "shirt": 1024, "trousers": 1024, "collar": 256, "shoes": 512, "hair": 256}
+
+MAX_FACES = 15_000
+"""Of a person in any outfit."""
 
 Paint = Callable[[Array, Outfit], Array]
 
@@ -68,6 +71,10 @@ def main() -> None:
         start = time.perf_counter()
         body = extract_body(STYLES[name].phenotype, STYLES[name].changes)
         parts = dress(body, STYLES[name])
+        for outfit in STYLES[name].outfits:
+            worn = sum(len(p.mesh.faces) for p in parts if p.textures.keys() & {"", outfit})
+            if worn > MAX_FACES:
+                raise SystemExit(f"{name} in {outfit} has {worn} triangles, at most {MAX_FACES} are allowed")
         file = f"humans/{name}.npz"
         write_npz(args.out / file, character_arrays(body, parts, list(STYLES[name].outfits)))
         update_manifest(args.out, file)

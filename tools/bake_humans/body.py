@@ -54,7 +54,12 @@ class Body:
 
     def eye(self) -> Array:
         """Centre of the left eye."""
-        return self.vertices[np.unique(self.faces["left_eye"])].mean(0)
+        return np.asarray(self.vertices[np.unique(self.faces["left_eye"])].mean(0))
+
+    def eye_radius(self) -> float:
+        """Of the eyeball, metres."""
+        points = self.vertices[np.unique(self.faces["left_eye"])]
+        return float(np.linalg.norm(points - points.mean(0), axis=1).mean())
 
 
 def extract_body(phenotype: dict[str, float], changes: dict[str, float]) -> Body:

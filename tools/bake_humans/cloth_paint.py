@@ -26,6 +26,8 @@ def paint_shirt(p: Array, tailor: Tailor, outfit: Outfit, seed: int) -> Array:
         image[front & (button < 0.0062) & (button > 0.0048)] = (150, 146, 140)
         pocket = _frame(x - 0.085, p[:, 2] - tailor.body.head("Spine1")[2] - 0.01, 0.048, 0.055, 0.0028)
         image[front & pocket] *= 0.62
+        # The shadow of the collar.
+        image *= 1 - 0.38 * np.clip(1.6 - tailor.rim_distance(p) / 0.042, 0, 1)[:, None]
     else:
         neckline = tailor.rim_distance(p)
         band = neckline < 0.020
@@ -45,7 +47,7 @@ def paint_shirt(p: Array, tailor: Tailor, outfit: Outfit, seed: int) -> Array:
 def paint_collar(p: Array, outfit: Outfit, seed: int) -> Array:
     """Colours of the collar: the shirt's pattern with a seam along its edge is too fine to see, so none."""
     around = np.arctan2(p[:, 0], -p[:, 1] - 0.02) * 0.075
-    return _pattern(around, p[:, 2], p, outfit, seed) * (1.02 + 0.03 * noise(p, 20, seed, "collar"))[:, None]
+    return _pattern(around, p[:, 2], p, outfit, seed) * (1.08 + 0.03 * noise(p, 20, seed, "collar"))[:, None]
 
 
 def paint_trousers(p: Array, tailor: Tailor, outfit: Outfit, seed: int) -> Array:
@@ -131,6 +133,23 @@ def _pattern(u: Array, v: Array, p: Array, outfit: Outfit, seed: int) -> Array:
                 band = strength * np.clip(1.5 - distance / width * 1.5, 0, 1)[:, None]
                 image = image * (1 - band) + colour * band
         image *= (1 + 0.05 * np.sin((u + v) * 2 * np.pi / 0.004))[:, None]
+    elif outfit.pattern == "gingham":
+        checks = ((u / 0.044) % 1 < 0.5).astype(float) + ((v / 0.044) % 1 < 0.5)
+        image = image + (colours[1] - image) * np.array([0.0, 0.55, 1.0])[checks.astype(int)][:, None]
+    elif outfit.pattern == "oxford":
+        image[(u / 0.013) % 1 < 0.18] = colours[1]
+        image *= (1 + 0.04 * np.sin((u + v) * 2 * np.pi / 0.003))[:, None]
+    elif outfit.pattern == "dots":
+        row = np.floor(v / 0.034)
+        du, dv = (u / 0.034 + 0.5 * (row % 2)) % 1 - 0.5, v / 0.034 - row - 0.5
+        image[np.hypot(du, dv) < 0.24] = colours[1]
+    elif outfit.pattern == "knit":
+        ribs = np.abs(np.sin(u * np.pi / 0.016)) ** 0.5
+        stitch = np.sin((v + 0.004 * np.sin(u * 2 * np.pi / 0.016)) * 2 * np.pi / 0.007)
+        image = colours[1] + (colours[0] - colours[1]) * (0.55 * ribs + 0.45 * (0.5 + 0.5 * stitch))[:, None]
+        yoke = (v + 0.02) % 0.30 < 0.055
+        zigzag = np.abs(((u / 0.03) % 1) - 0.5) * 0.05 + 0.015
+        image[yoke & (np.abs((v + 0.02) % 0.30 - zigzag) < 0.009)] = colours[2]
     elif outfit.pattern == "stripe":
         image[(v / 0.044) % 1 < 0.45] = colours[1]
     elif outfit.pattern == "jersey_stripe":
@@ -175,16 +194,19 @@ def _shirt_shade(p: Array, tailor: Tailor, is_sleeve: Array, along: Array, seed:
         """Height of the folds; s runs down the sleeve."""
         bend = np.exp(-(((s - elbow) / 0.08) ** 2)) + 0.8 * np.exp(-(((s - length + 0.05) / 0.06) ** 2))
         sleeve = noise(np.c_[q[:, 0] * 0.25, q[:, 1] * 0.5, s], 18, seed, "sleeve rings", octaves=2)
-        trunk = noise(np.c_[q[:, 0] + 0.4 * q[:, 2], q[:, 1], 0.9 * q[:, 2]], 7, seed, "trunk folds")
-        low = np.exp(-(((q[:, 2] - waist_z) / 0.14) ** 2))
-        return np.where(is_sleeve, sleeve * (0.3 + bend), trunk * (0.45 + 0.6 * low))
+        across = np.abs(q[:, 0])
+        drapes = noise(np.c_[q[:, 0] + 0.35 * q[:, 2], 0.5 * q[:, 1], 0.30 * q[:, 2]], 9, seed, "drapes", octaves=2)
+        creases = noise(np.c_[0.35 * q[:, 0], 0.5 * q[:, 1], q[:, 2] - 0.5 * across], 13, seed, "creases", octaves=2)
+        low = np.exp(-(((q[:, 2] - waist_z) / 0.12) ** 2))
+        return np.where(is_sleeve, sleeve * (0.3 + bend), 0.8 * drapes * (0.5 + 0.5 * low) + 0.55 * creases * low)
 
     step = np.where(is_sleeve, FOLD_LIGHT_M, 0.0)
-    slope = folds(p + np.array([0, 0, FOLD_LIGHT_M]) * ~is_sleeve[:, None], along - step) - folds(p, along)
+    towards_light = np.array([0.6, 0, 1.0]) * FOLD_LIGHT_M
+    slope = folds(p + towards_light * ~is_sleeve[:, None], along - step) - folds(p, along)
     armpit = body.head("LeftArm") - np.array([0.0, 0.0, 0.10])
     near = np.minimum(np.linalg.norm(p - armpit, axis=1), np.linalg.norm(p - armpit * [-1, 1, 1], axis=1))
-    shade: Array = 1 - 0.19 * np.clip(slope, -1.2, 1.2) - 0.22 * np.exp(-((near / 0.06) ** 2))
-    return shade * (1 + 0.04 * noise(p, 5, seed, "shade"))
+    shade: Array = 1 - 0.22 * np.clip(slope, -1.2, 1.2) - 0.22 * np.exp(-((near / 0.06) ** 2))
+    return shade * (1 + 0.02 * noise(p, 5, seed, "shade"))
 
 
 def _armhole(body: Body) -> float:
@@ -208,9 +230,14 @@ def _sleeve_length(body: Body) -> float:
 
 
 def _shirt_coordinates(p: Array, body: Body) -> tuple[Array, Array, Array]:
-    """Metres around and along: the trunk as a cylinder about z, each arm about its two bones; and which is sleeve."""
+    """Metres around and along: the trunk as two panels, each arm about its two bones; and which is sleeve."""
     is_sleeve = (np.abs(p[:, 0]) > _armhole(body)) & (_arm_distance(p, body) < 0.10)
-    around, along = np.arctan2(p[:, 1] + 0.01, p[:, 0]) * 0.16, p[:, 2].copy()
+    x, y = p[:, 0], p[:, 1] - body.head("LeftArm")[1]
+    # Front and back are flat panels that meet in side seams and on the shoulders, as a shirt is cut.
+    towards_side = _ramp(np.abs(x), 0.10, 0.17)
+    around = np.sign(x) * (np.abs(x) + towards_side * (0.10 - np.abs(y)))
+    on_top = _ramp(p[:, 2], body.head("LeftArm")[2] - 0.08, body.head("LeftArm")[2] + 0.04)
+    along = p[:, 2] - 0.9 * on_top * np.minimum(np.abs(y), 0.05)
     for side in ("Left", "Right"):
         shoulder, elbow, wrist = (body.head(side + b) for b in ("Arm", "ForeArm", "Hand"))
         own = is_sleeve & (np.sign(p[:, 0]) == np.sign(wrist[0]))
@@ -228,6 +255,11 @@ def _shirt_coordinates(p: Array, body: Body) -> tuple[Array, Array, Array]:
         bend = bend[:, 0]
         along[own] = (q - shoulder) @ upper_axis * (1 - bend) + ((q - elbow) @ fore_axis + upper_length) * bend
     return around, along, is_sleeve
+
+
+def _ramp(x: Array, low: float, high: float) -> Array:
+    """From 0 at `low` to 1 at `high`."""
+    return np.clip((x - low) / (high - low), 0, 1)
 
 
 def _frame(u: Array, v: Array, half_width: float, half_height: float, thickness: float) -> Array:

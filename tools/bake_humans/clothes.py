@@ -3,6 +3,8 @@
 All cuts run along planes or smooth fields through the triangles, so hems are straight whatever the mesh.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -21,12 +23,13 @@ from tools.bake_humans.mesh import (
     subdivide,
     unit,
     vertex_normals,
+    weld,
 )
 from tools.bake_humans.texture import noise
 
 FAR = 0.05
 """Value of a cut's field where that cut does not apply."""
-FACES = {"shirt": 4200, "trousers": 3000, "shoes": 1800}
+FACES = {"shirt": 2150, "trousers": 1600, "shoes": 1150}
 SOLE_EDGE_M = 0.013
 """Below this height the foot surface becomes the flat underside of the shoe."""
 HANDS = ("Hand", "Thumb", "Finger")
@@ -139,7 +142,9 @@ class Tailor:
         stretched = np.maximum(height - SOLE_EDGE_M, 0) * 0.03 / (0.03 - SOLE_EDGE_M)
         upper.vertices[:, 2] = np.where(height < 0.03, stretched, height)
         under.vertices[:, 2] = 0.0
-        upper, under = simplify(upper, FACES["shoes"])[0], simplify(under, FACES["shoes"] // 6)[0]
+        shoes = simplify(weld(join(upper, under)), FACES["shoes"])[0]
+        is_under = (shoes.vertices[shoes.faces, 2] == 0).all(1)
+        upper, under = (compact(replace(shoes, faces=shoes.faces[part])) for part in (~is_under, is_under))
         top_only = border_edges(upper.faces)
         top_only = top_only[(upper.vertices[top_only, 2] > 0.03).all(1)]
         return join(fold_hems(upper, 0.010, top_only), under)
@@ -152,7 +157,7 @@ class Tailor:
         order = np.argsort(np.arctan2(offset[:, 0], -offset[:, 1]), kind="stable")
         rim, offset = rim[order], offset[order]
         angle = np.arctan2(offset[:, 0], -offset[:, 1])  # 0 in front, growing to the person's left
-        gap = 0.16
+        gap = 0.21
         theta = np.linspace(gap, 2 * np.pi - gap, 41)
         around = np.r_[angle - 2 * np.pi, angle, angle + 2 * np.pi]
         wrapped = np.where(theta > np.pi, theta - 2 * np.pi, theta)
@@ -167,10 +172,10 @@ class Tailor:
         radial = base - centre
         radial[:, 2] = 0
         radial = unit(radial)
-        edge = 1 - np.clip((np.minimum(theta, 2 * np.pi - theta) - gap) / 0.35, 0, 1)
+        edge = 1 - np.clip((np.minimum(theta, 2 * np.pi - theta) - gap) / 0.55, 0, 1)
         up = np.array([0.0, 0.0, 1.0])
-        stand, fall = 0.030 - 0.010 * front, 0.040 + 0.012 * front
-        point = 0.020 * edge  # the tips
+        stand, fall = 0.030 - 0.010 * front, 0.042 + 0.016 * front
+        point = 0.034 * edge  # the tips
         tilt = 0.34 * stand
         rows = [
             base - up * 0.008 - radial * 0.004,

@@ -1,16 +1,50 @@
 """Hair: a thin cap on the scalp, and on it locks that grow along the head and fall."""
 
+from dataclasses import dataclass
+
 import numpy as np
+from scipy.ndimage import gaussian_filter
 from scipy.spatial import cKDTree
 
 from tools.bake_humans.body import BODY_VERTICES, Body
 from tools.bake_humans.mesh import Array, Mesh, clip, compact, simplify, smooth, unit, vertex_normals
-from tools.bake_humans.styles import Style
+from tools.bake_humans.styles import HairCut, Style
 from tools.bake_humans.texture import generator, noise
 
-CAP_FACES = 900
 STRANDS = 8
 """Columns of the hair texture; each lock shows one."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cut:
+    """How a hair cut is built.
+
+    Attributes:
+        cap_faces: triangles of the cap.
+        lift_m: of the cap over the skin, away from the hairline.
+        lumps_m: how much the cap goes up and down.
+        locks: how many grow from the scalp.
+        steps: of each lock's path; a lock has 6 steps - 3 triangles.
+        gravity: how fast a lock turns downwards.
+    """
+
+    cap_faces: int
+    lift_m: float
+    lumps_m: float
+    locks: int
+    steps: int
+    gravity: float
+
+
+CUTS: dict[HairCut, Cut] = {
+    "short": Cut(cap_faces=600, lift_m=0.008, lumps_m=0.0, locks=400, steps=2, gravity=0.25),
+    "cropped": Cut(cap_faces=1900, lift_m=0.009, lumps_m=0.0022, locks=230, steps=2, gravity=0.0),
+    "long": Cut(cap_faces=500, lift_m=0.010, lumps_m=0.0, locks=138, steps=5, gravity=0.55),
+    "ponytail": Cut(cap_faces=800, lift_m=0.006, lumps_m=0.0, locks=100, steps=4, gravity=0.0),
+}
+TAIL_LOCKS, TAIL_STEPS = 26, 7
+FRINGE_LOCKS, TEMPLE_LOCKS, TEMPLE_STEPS = 16, 3, 4
+"""Of a ponytail: the tail itself, the fringe, and on each side the thin locks that escaped it."""
 
 
 def above_hairline(p: Array, body: Body, style: Style) -> Array:
@@ -23,7 +57,7 @@ def above_hairline(p: Array, body: Body, style: Style) -> Array:
         [-0.03, 0.02, 0.045, 0.058, 0.080, 0.092, 0.112, 0.125, 0.20],
         [0.064, 0.058, 0.036, -0.010, -0.018, 0.012, 0.006, -0.035, -0.075],
     )
-    if style.has_long_hair:
+    if style.is_combed_down:
         line = line + np.interp(back, [0.0, 0.06, 0.09], [-0.004, -0.004, 0.0])
     recede = 0.010 * np.exp(-(((x - 0.045) / 0.015) ** 2)) * (back < 0.06)
     return np.asarray(z - line - recede)
@@ -45,13 +79,15 @@ def make_hair(body: Body, style: Style) -> tuple[Mesh, Array, Array]:
         Mesh(surface, head.faces, np.c_[head.weights, normals]),
         lambda p, _: above_hairline(p, body, style) + 0.004 * noise(p, 40, style.seed, "cap edge", octaves=2) - 0.002,
     )
+    cut = CUTS[style.hair_cut]
     depth = np.clip(above_hairline(scalp.vertices, body, style) / 0.03, 0, 1)
-    lift = 0.0015 + (0.010 if style.has_long_hair else 0.008) * depth
+    lumps = cut.lumps_m * noise(scalp.vertices, 32, style.seed, "lumps", octaves=2)
+    lift = 0.0015 + (cut.lift_m + lumps) * depth
     cap = Mesh(scalp.vertices + scalp.weights[:, -3:] * lift[:, None], scalp.faces, scalp.weights[:, :-3])
-    cap = simplify(cap, CAP_FACES)[0]
+    cap = simplify(cap, cut.cap_faces)[0]
     cap_uv = np.stack([cap.vertices[:, 0] * 9, 0.25 + 0.0 * cap.vertices[:, 1]], 1)
     cap_uv[:, 0] += cap.vertices[:, 1] * 5
-    locks, lock_uv, lock_ups = _grow(body, style, scalp, lift)
+    locks, lock_uv, lock_ups = _Growth(body, style, scalp, lift).mesh()
     mesh = Mesh(
         np.concatenate([cap.vertices, locks.vertices]),
         np.concatenate([cap.faces, locks.faces + len(cap.vertices)]),
@@ -65,6 +101,9 @@ def make_hair(body: Body, style: Style) -> tuple[Mesh, Array, Array]:
 def paint_hair(style: Style, size: int) -> Array:
     """(size, size, 3) strands: columns of slightly different tone, darker at the root."""
     rng = generator(style.seed, "strands")
+    if style.hair_cut == "cropped":  # curls, the same in all directions
+        curls = sum(gaussian_filter(rng.normal(size=(size, size)), s, mode="wrap") * 2 * s for s in (1.0, 2.5))
+        return np.clip(np.array(style.hair, float) * (1.1 + 0.34 * curls)[..., None], 0, 255).astype(np.uint8)
     column = np.arange(size) * STRANDS // size
     tone = rng.uniform(0.86, 1.14, STRANDS)[column]
     fine = np.repeat(rng.normal(size=size // 2), 2)
@@ -78,76 +117,157 @@ def paint_hair(style: Style, size: int) -> Array:
     return np.clip(np.array(style.hair, float) * shade[..., None], 0, 255).astype(np.uint8)
 
 
-def _grow(body: Body, style: Style, scalp: Mesh, lift: Array) -> tuple[Mesh, Array, Array]:
-    """Locks from roots spread evenly over the scalp: mesh, uv and the direction away from the head at each vertex."""
-    rng = generator(style.seed, "locks")
-    count, steps = (170, 8) if style.has_long_hair else (300, 3)
-    inside = np.flatnonzero(above_hairline(scalp.vertices, body, style) > 0.002)
-    roots = _spread(scalp.vertices[inside], count, rng)
-    chosen = inside[roots]
-    points, normals = scalp.vertices + scalp.weights[:, -3:] * lift[:, None], scalp.weights[:, -3:]
-    obstacles, outward = _obstacles(body)
-    tree = cKDTree(obstacles)
-    level_z = body.eye()[2] - 0.02
-    head_centre = scalp.vertices.mean(0)
-    vertices, faces, uvs, away = [], [], [], []
-    total = 0
-    for number, i in enumerate(chosen):
-        root, normal = points[i], unit(normals[i : i + 1])[0]
-        direction, length, width, margin = _start(root, normal, head_centre, body, style, rng)
+class _Growth:
+    """The locks of one head."""
+
+    def __init__(self, body: Body, style: Style, scalp: Mesh, lift: Array) -> None:
+        self.body, self.style, self.cut = body, style, CUTS[style.hair_cut]
+        self.rng = generator(style.seed, "locks")
+        inside = np.flatnonzero(above_hairline(scalp.vertices, body, style) > 0.002)
+        chosen = inside[_spread(scalp.vertices[inside], self.cut.locks, self.rng)]
+        self.normals = scalp.weights[chosen, -3:]
+        self.roots = scalp.vertices[chosen] + self.normals * lift[chosen, None]
+        self.centre = scalp.vertices.mean(0)
+        self.obstacles, self.outward = _obstacles(body)
+        self.tree = cKDTree(self.obstacles)
+        back = scalp.vertices[np.abs(scalp.vertices[:, 2] - body.eye()[2] - 0.035) < 0.02]
+        self.tie = back[back[:, 1].argmax()] * [0, 1, 1] + [0, 0.016, 0]
+        """Where a ponytail is bound."""
+        self.vertices: list[Array] = []
+        self.faces: list[Array] = []
+        self.uvs: list[Array] = []
+        self.away: list[Array] = []
+
+    def mesh(self) -> tuple[Mesh, Array, Array]:
+        """All locks; uv (n, 2); and the direction away from the head at each vertex (n, 3)."""
+        for root, normal in zip(self.roots, self.normals, strict=True):
+            if self.style.hair_cut == "ponytail":
+                self._comb_to_tie(root, normal)
+            else:
+                self._fall(root, normal)
+        if self.style.hair_cut == "ponytail":
+            self._bind_tail()
+        starts = np.cumsum([0] + [len(v) for v in self.vertices])
+        weights = np.zeros((starts[-1], len(self.body.names)))
+        weights[:, self.body.names.index("Head")] = 1
+        faces = np.concatenate([f + start for f, start in zip(self.faces, starts[:-1], strict=True)])
+        return (
+            Mesh(np.concatenate(self.vertices), faces, weights),
+            np.concatenate(self.uvs),
+            unit(np.concatenate(self.away)),
+        )
+
+    def _fall(self, root: Array, normal: Array) -> None:
+        """A lock that starts along the head and is drawn down."""
+        direction, length, width, margin = self._start(root, normal)
+        hangs = self.style.hair_cut == "long"
+        level_z = self.body.eye()[2] - 0.02
         path, ups = [root - 0.004 * normal], [normal]
-        position, step = root.copy(), length / steps
+        position, steps = root.copy(), self.cut.steps
         for k in range(1, steps + 1):
-            gravity = (0.55 if style.has_long_hair else 0.25) * min(1.0, k / 2)
-            direction = unit((direction + gravity * np.array([0.0, 0.0, -1.0]))[None])[0]
-            position = position + direction * step
-            distance, near = tree.query(position, k=4)
-            up = unit(outward[near].mean(0)[None])[0]
-            height = ((position - obstacles[near]) @ up).mean()
-            want = margin * (1 if style.has_long_hair else 0.7 + 0.5 * np.sin(np.pi * k / steps))
-            if distance.min() < 0.06 and height < want:
+            fall = self.cut.gravity * min(1.0, k / 2)
+            direction = unit((direction + fall * np.array([0.0, 0.0, -1.0]))[None])[0]
+            position = position + direction * length / steps
+            up, height, near = self._over_skin(position)
+            want = margin * (1 if hangs else 0.7 + 0.5 * np.sin(np.pi * k / steps))
+            if near and height < want:
                 position = position + up * (want - height)
-            elif style.has_long_hair and position[2] > level_z:  # lies on the head down to the cheek, then hangs
+            elif hangs and position[2] > level_z:  # lies on the head down to the cheek, then hangs
                 position = position - up * 0.8 * (height - want)
             direction = unit((position - path[-1])[None])[0]
             path.append(position.copy())
-            ups.append(up if distance.min() < 0.06 else ups[-1])
-        lock, faces_lock, uv = _lock(np.array(path), np.array(ups), width, number % STRANDS)
-        vertices.append(lock)
-        faces.append(faces_lock + total)
-        uvs.append(uv)
-        away.append(np.concatenate([np.tile(np.array(ups)[:-1], (3, 1)), ups[-1:]]))
-        total += len(lock)
-    weights = np.zeros((total, len(body.names)))
-    weights[:, body.names.index("Head")] = 1
-    return (
-        Mesh(np.concatenate(vertices), np.concatenate(faces), weights),
-        np.concatenate(uvs),
-        unit(np.concatenate(away)),
-    )
+            ups.append(up if near else ups[-1])
+        self._add(path, ups, width)
 
+    def _comb_to_tie(self, root: Array, normal: Array) -> None:
+        """A lock that follows the head to where the ponytail is bound."""
+        width, margin = self.rng.uniform(0.020, 0.030), self.rng.uniform(0.007, 0.012)
+        path, ups = [root - 0.003 * normal], [normal]
+        for k in range(1, self.cut.steps + 1):
+            share = min(1.0, 1.15 * k / self.cut.steps)
+            position = root * (1 - share) + self.tie * share
+            up, height, _ = self._over_skin(position)
+            path.append(position + up * (max(height, margin * (0.4 + 0.6 * share)) - height))
+            ups.append(up)
+        self._add(path, ups, width)
 
-def _start(
-    root: Array, normal: Array, centre: Array, body: Body, style: Style, rng: np.random.Generator
-) -> tuple[Array, float, float, float]:
-    """First direction, length, width and height over the skin of the lock at `root`."""
-    eye = body.eye()
-    jitter = rng.normal(size=3)
-    if style.has_long_hair:
-        side = np.sign(root[0] - 0.018) or 1.0  # parted a little to the left
-        front = np.clip((eye[1] + 0.11 - root[1]) / 0.07, 0, 1)
-        flow = np.array([side * (0.25 + 0.75 * front), 0.15 + 0.75 * front, -0.5]) + 0.10 * jitter
-        to_shoulder = root[2] - (body.head("Neck")[2] + 0.035)
-        length = 1.12 * to_shoulder + 0.02 * rng.uniform() + 0.25 * abs(root[0] - centre[0])
-        width, margin = rng.uniform(0.026, 0.040), rng.uniform(0.008, 0.018)
-    else:
-        top = np.clip((root[2] - eye[2] - 0.05) / 0.05, 0, 1)
-        # Combed to the side and back on top, downwards at the sides and the back.
-        flow = np.array([-0.55 * top, 0.25 + 0.35 * top, -0.9 * (1 - top) + 0.15 * top]) + 0.20 * jitter
-        length = (0.024 + 0.026 * top) * rng.uniform(0.8, 1.2)
-        width, margin = rng.uniform(0.014, 0.022), 0.005 + 0.009 * top * rng.uniform(0.6, 1.3)
-    flow = flow - normal * (flow @ normal) + 0.10 * normal * (not style.has_long_hair)
-    return unit(flow[None])[0], float(length), float(width), float(margin)
+    def _bind_tail(self) -> None:
+        """The tail, and a few thin locks in front of the ears."""
+        down = np.array([0.0, 0.0, -1.0])
+        for _ in range(TAIL_LOCKS):
+            spread = self.rng.normal(size=3)
+            direction = unit((np.array([0.0, 0.75, 0.05]) + 0.13 * spread)[None])[0]
+            position = self.tie + 0.007 * self.rng.normal(size=3) - [0, 0.012, 0]
+            path, ups = [position], [np.array([0.0, 0.6, 0.8])]
+            length = self.rng.uniform(0.20, 0.29)
+            for _ in range(TAIL_STEPS):
+                direction = unit((direction + 0.75 * down)[None])[0]
+                position = position + direction * length / TAIL_STEPS
+                up, height, near = self._over_skin(position)
+                if near and height < 0.018:
+                    position = position + up * (0.018 - height)
+                path.append(position)
+                ups.append(unit((np.array([0.0, 0.8, 0.3]) + 0.5 * spread * [1, 0, 0])[None])[0])
+            self._add(path, ups, self.rng.uniform(0.016, 0.026))
+        eye = self.body.eye()
+        front = self.roots[np.argsort(self.roots[:, 1] - 0.5 * self.roots[:, 2], kind="stable")[:FRINGE_LOCKS]]
+        for root in front:  # the fringe is swept to the left
+            position, path, ups = root + np.array([0, 0.012, 0.004]), [], []
+            for k in range(TEMPLE_STEPS + 1):
+                up, height, _ = self._over_skin(position)
+                position = position + up * (0.009 - height)
+                path.append(position)
+                ups.append(up)
+                position = position + np.array([0.013, -0.004 + 0.001 * k, -0.011]) * self.rng.uniform(0.9, 1.1)
+            self._add(path, ups, self.rng.uniform(0.016, 0.024))
+        for side in (-1.0, 1.0):
+            for number in range(TEMPLE_LOCKS):
+                position = np.array([side * 0.066, eye[1] + 0.040 + 0.008 * number, eye[2] + 0.020])
+                length = self.rng.uniform(0.06, 0.11)
+                path, ups = [], []
+                for _ in range(TEMPLE_STEPS + 1):
+                    up, height, _ = self._over_skin(position)
+                    position = position + up * (0.006 - height)
+                    path.append(position)
+                    ups.append(up)
+                    position = position + down * length / TEMPLE_STEPS + [side * 0.002, 0.002, 0]
+                self._add(path, ups, self.rng.uniform(0.005, 0.010))
+
+    def _start(self, root: Array, normal: Array) -> tuple[Array, float, float, float]:
+        """First direction, length, width and height over the skin of a falling lock."""
+        eye, rng = self.body.eye(), self.rng
+        jitter = rng.normal(size=3)
+        if self.style.hair_cut == "long":
+            side = np.sign(root[0] - 0.018) or 1.0  # parted a little to the left
+            front = np.clip((eye[1] + 0.11 - root[1]) / 0.07, 0, 1)
+            flow = np.array([side * (0.25 + 0.75 * front), 0.15 + 0.75 * front, -0.5]) + 0.10 * jitter
+            to_shoulder = root[2] - (self.body.head("Neck")[2] + 0.035)
+            length = 1.12 * to_shoulder + 0.02 * rng.uniform() + 0.25 * abs(root[0] - self.centre[0])
+            width, margin, rise = rng.uniform(0.028, 0.044), rng.uniform(0.008, 0.018), 0.0
+        elif self.style.hair_cut == "cropped":
+            flow, rise = 0.8 * jitter, 0.6
+            length, width, margin = rng.uniform(0.010, 0.017), rng.uniform(0.010, 0.015), 0.006
+        else:
+            top = np.clip((root[2] - eye[2] - 0.05) / 0.05, 0, 1)
+            # Combed to the side and back on top, downwards at the sides and the back.
+            flow = np.array([-0.55 * top, 0.25 + 0.35 * top, -0.9 * (1 - top) + 0.15 * top]) + 0.20 * jitter
+            length = (0.024 + 0.026 * top) * rng.uniform(0.8, 1.2)
+            width, margin, rise = rng.uniform(0.013, 0.021), 0.005 + 0.009 * top * rng.uniform(0.6, 1.3), 0.10
+        flow = flow - normal * (flow @ normal) + rise * normal
+        return unit(flow[None])[0], float(length), float(width), float(margin)
+
+    def _over_skin(self, position: Array) -> tuple[Array, float, bool]:
+        """Direction away from the head, height over it, and whether it is near at all."""
+        distance, near = self.tree.query(position, k=4)
+        up = unit(self.outward[near].mean(0)[None])[0]
+        return up, float(((position - self.obstacles[near]) @ up).mean()), bool(distance.min() < 0.06)
+
+    def _add(self, path: list[Array], ups: list[Array], width: float) -> None:
+        lock, faces, uv = _lock(np.array(path), np.array(ups), width, len(self.vertices) % STRANDS)
+        self.vertices.append(lock)
+        self.faces.append(faces)
+        self.uvs.append(uv)
+        self.away.append(np.concatenate([np.tile(np.array(ups)[:-1], (3, 1)), ups[-1][None]]))
 
 
 def _lock(path: Array, ups: Array, width: float, column: int) -> tuple[Array, Array, Array]:
@@ -156,6 +276,8 @@ def _lock(path: Array, ups: Array, width: float, column: int) -> tuple[Array, Ar
     t = np.linspace(0, 1, n)
     tangent = unit(np.gradient(path, axis=0))
     across = unit(np.cross(tangent, ups))
+    for k in range(1, n):  # a lock that stands up must not turn over
+        across[k] *= np.sign(across[k] @ across[k - 1]) or 1.0
     over = np.cross(across, tangent)
     half = (0.5 * width * np.clip(np.minimum(0.55 + 2.0 * t, 1.9 * (1 - t) ** 0.6 + 0.0), 0, 1))[:-1, None]
     core = path[:-1]

@@ -6,14 +6,14 @@ import numpy as np
 import scipy.sparse
 
 from tools.bake_humans.body import BODY_VERTICES, Body
-from tools.bake_humans.mesh import Array, Mesh, simplify, smooth, vertex_normals
+from tools.bake_humans.mesh import Array, Mesh, border_edges, simplify, smooth, vertex_normals
 from tools.bake_humans.skin_paint import paint_skin
 from tools.bake_humans.styles import Style
 from tools.bake_humans.texture import bake_map, fill, sample
 
-SKIN_FACES = 6800
+SKIN_FACES = 4600
 INNER_MOUTH = (84, 36, 36)
-EYE_RINGS, EYE_SIDES = 6, 12
+EYE_RINGS, EYE_SIDES = 5, 10
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -64,7 +64,9 @@ def make_skin(body: Body, style: Style, size: int) -> Textured:
     colours = paint_skin(texels[:, :3], texels[:, 3], sample(body.lips, texels[:, 4:]) / 255.0, body, style)
     colours[sample(body.mouth, texels[:, 4:]) > 127] = INNER_MOUTH
     counts = np.bincount(pairs[:, 0], minlength=len(v))
-    mesh, kept = simplify(Mesh(v[pairs[:, 0]], corner, w[pairs[:, 0]]), SKIN_FACES, counts[pairs[:, 0]] > 1)
+    seams = counts[pairs[:, 0]] > 1
+    seams[border_edges(corner)] = True
+    mesh, kept = simplify(Mesh(v[pairs[:, 0]], corner, w[pairs[:, 0]]), SKIN_FACES, seams)
     return Textured(mesh=mesh, uv=uv[kept], weld=pairs[kept, 0], texture=fill(colours, mask))
 
 

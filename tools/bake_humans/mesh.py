@@ -11,6 +11,9 @@ import scipy.sparse
 
 Array = npt.NDArray[Any]
 
+BORDER_WEIGHT = 3.0
+"""Of the planes that hold a border, against those of the faces."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mesh:
@@ -33,14 +36,18 @@ def unit(v: Array) -> Array:
 
 
 def vertex_normals(vertices: Array, faces: Array, weld: Array | None = None) -> Array:
-    """(n, 3) area-weighted normals; vertices with the same number in `weld` (n,) share theirs."""
+    """(n, 3) area-weighted normals; vertices with the same number in `weld` (n,) share theirs, unless they cancel."""
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     face_normal = np.cross(b - a, c - a)
     place = np.arange(len(vertices)) if weld is None else weld
     total = np.zeros((int(place.max()) + 1, 3))
     for k in range(3):
         np.add.at(total, place[faces[:, k]], face_normal)
-    return unit(total[place])
+    shared = unit(total[place])
+    flat = np.linalg.norm(shared, axis=1) < 0.5 if weld is not None else np.zeros(len(place), bool)
+    if flat.any():  # a fold so thin that nothing is between its two sides
+        shared[flat] = vertex_normals(vertices, faces)[flat]
+    return shared
 
 
 def compact(mesh: Mesh) -> Mesh:
@@ -57,6 +64,12 @@ def join(*meshes: Mesh) -> Mesh:
         np.concatenate([m.faces + start for m, start in zip(meshes, starts[:-1], strict=True)]),
         np.concatenate([m.weights for m in meshes]),
     )
+
+
+def weld(mesh: Mesh) -> Mesh:
+    """Vertices at the same place (to 1 µm) become one."""
+    _, first, place = np.unique(np.rint(mesh.vertices * 1e6), axis=0, return_index=True, return_inverse=True)
+    return Mesh(mesh.vertices[first], place.ravel()[mesh.faces], mesh.weights[first])
 
 
 def edges_of(faces: Array) -> Array:
@@ -164,12 +177,13 @@ def fold_hems(mesh: Mesh, depth: float, border: Array | None = None) -> Mesh:
 def simplify(mesh: Mesh, target_faces: int, locked: Array | None = None) -> tuple[Mesh, Array]:
     """Fewer triangles by half-edge collapses in the order of the quadric error (Garland and Heckbert 1997).
 
-    Vertices never move, so whatever belongs to them (weights, UVs) stays right. Borders are kept.
+    Vertices never move, so whatever belongs to them (weights, UVs) stays right. A border vertex collapses along the
+    border only, and planes through the border edges hold its line (section 6 there).
 
     Args:
         mesh: to simplify.
         target_faces: stop there.
-        locked: (n,) vertices that must stay, besides the border.
+        locked: (n,) vertices that must stay.
 
     Returns:
         The mesh, and the index (k,) of each of its vertices in the old one.
@@ -181,8 +195,10 @@ def simplify(mesh: Mesh, target_faces: int, locked: Array | None = None) -> tupl
     for f, face in enumerate(mesh.faces.tolist()):
         for corner in face:
             around[corner].add(f)
-    fixed = np.zeros(n, bool) if locked is None else locked.copy()
-    fixed[np.unique(border_edges(mesh.faces))] = True
+    fixed = np.zeros(n, bool) if locked is None else locked
+    border = border_edges(mesh.faces)
+    on_border = np.zeros(n, bool)
+    on_border[border] = True
     quadric = np.zeros((n, 4, 4))
     a, b, c = (v[mesh.faces[:, k]] for k in range(3))
     normal = np.cross(b - a, c - a)
@@ -191,6 +207,12 @@ def simplify(mesh: Mesh, target_faces: int, locked: Array | None = None) -> tupl
     q = area[:, :, None] * plane[:, :, None] * plane[:, None, :]
     for k in range(3):
         np.add.at(quadric, mesh.faces[:, k], q)
+    along = v[border[:, 1]] - v[border[:, 0]]
+    wall = unit(np.cross(along, unit(vertex_normals(v, mesh.faces)[border].sum(1))))
+    wall = np.c_[wall, -(wall * v[border[:, 0]]).sum(1)]
+    q = BORDER_WEIGHT * (along**2).sum(1)[:, None, None] * wall[:, :, None] * wall[:, None, :]
+    for k in range(2):
+        np.add.at(quadric, border[:, k], q)
     homogeneous = np.c_[v, np.ones(n)]
     version = [0] * n
 
@@ -210,7 +232,12 @@ def simplify(mesh: Mesh, target_faces: int, locked: Array | None = None) -> tupl
         if version[i] != vi or version[j] != vj or not around[i]:
             continue
         shared = around[i] & around[j]
-        if len(shared) != 2 or len(neighbours(i) & neighbours(j)) != 2 or _flips(v, faces, around[i] - shared, i, j):
+        sides = 1 if on_border[i] else 2  # a border vertex moves along a border edge, which has one face
+        if (
+            len(shared) != sides
+            or len(neighbours(i) & neighbours(j)) != sides
+            or _flips(v, faces, around[i] - shared, i, j)
+        ):
             continue
         for f in shared:
             for corner in faces[f] or ():

@@ -4,6 +4,7 @@ import numpy as np
 
 from tools.bake_humans.body import Body
 from tools.bake_humans.hair import above_hairline
+from tools.bake_humans.keypoints import nose_tip
 from tools.bake_humans.mesh import Array
 from tools.bake_humans.styles import Style
 from tools.bake_humans.texture import generator, noise
@@ -33,26 +34,29 @@ def paint_skin(p: Array, hollow: Array, lips: Array, body: Body, style: Style) -
 
     # The rim of the lids: skin that almost touches the eyeball. Dark above (lashes), faint below.
     centre = np.where(p[:, :1] > 0, eye, eye * [-1, 1, 1])
-    radius = np.linalg.norm(body.vertices[np.unique(body.faces["left_eye"])] - eye, axis=1).mean()
-    gap = np.linalg.norm(p - centre, axis=1) - radius
-    lid = np.clip(1.2 - gap / (0.0022 if style.has_long_hair else 0.0018), 0, 1) * front
+    gap = np.linalg.norm(p - centre, axis=1) - body.eye_radius()
+    lid = np.clip(1.2 - gap / style.lash_m, 0, 1) * front
     lash = lid * np.where(p[:, 2] > centre[:, 2] - 0.001, 0.85, 0.35)
     image = image * (1 - lash[:, None]) + np.array((34, 24, 20.0)) * lash[:, None]
 
     brow_x = (x - eye[0] - 0.004) / 0.024
     arch = 0.0185 + 0.0035 * (1 - brow_x**2) + 0.0010 * brow_x
-    thick = (0.0046 if style.has_stubble else 0.0033) * (1 - 0.35 * np.clip(brow_x, -1, 1))
+    thick = style.brow_m * (1 - 0.35 * np.clip(brow_x, -1, 1))
     strokes = 0.85 + 0.16 * noise(p * [1.0, 1, 1.6], 60, seed, "brows", octaves=1)
     brow = np.clip(1.4 - np.abs(z - arch) / thick, 0, 1) * np.clip((1.05 - np.abs(brow_x)) * 6, 0, 1) * front
     brow = np.clip(brow * strokes, 0, 0.88)[:, None]
     image = image * (1 - brow) + hair * 0.75 * brow
 
-    if style.has_stubble:
-        jaw = np.exp(-(((z + 0.100) / 0.036) ** 2)) * np.clip((eye[1] + 0.085 - p[:, 1]) / 0.03, 0, 1)
-        moustache = glow(x, z + 0.058, 0.024, 0.008)
-        amount = np.clip(jaw + 0.8 * moustache * front, 0, 1) * is_head * (1 - lips)
+    if style.beard:
+        under_nose = nose_tip(body)[2] - eye[2] - 0.018
+        jaw = np.exp(-(((z - under_nose + 0.046) / 0.036) ** 2)) * np.clip((eye[1] + 0.085 - p[:, 1]) / 0.03, 0, 1)
+        burns = np.clip(1 - np.abs(p[:, 1] - eye[1] - 0.062) / 0.012, 0, 1) * (z < -0.01) * (z > -0.10)
+        moustache = glow(x, z - under_nose, 0.024, 0.007) * front
+        amount = np.clip(1.3 * jaw + 0.9 * moustache + style.beard * burns, 0, 1) * is_head * (1 - lips)
         amount = amount * np.clip((p[:, 2] - body.head("Neck1")[2] + 0.005) / 0.03, 0, 1)
-        image *= 1 - (amount * (0.20 + 0.05 * grain))[:, None] * [1.0, 0.95, 0.85]
+        bristle = 1 + 0.25 * grain + 0.25 * noise(p, 90, seed, "beard", octaves=1)
+        amount = np.clip(style.beard * amount * bristle, 0, 0.92)[:, None]
+        image = image * (1 - amount) + (0.25 * image + 0.6 * hair) * amount
 
     root = above_hairline(p, body, style) + 0.003 * noise(p, 55, seed, "hairline", octaves=2)
     scalp = np.clip(root / 0.010, 0, 1) * is_head
