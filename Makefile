@@ -4,13 +4,16 @@ VENV := .venv
 BIN := $(VENV)/bin
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: demo test lint clean
+.PHONY: demo test test-all lint clean
 
 demo: $(VENV)/.installed  ## install and run the whole way once: about four minutes
 	$(BIN)/dotmask run fr3_walking_xyz --out runs/demo-$$(date +%Y%m%d-%H%M%S)
 
-test: $(VENV)/.installed-dev  ## install and run all tests
-	$(BIN)/python -m pytest -n auto --dist loadfile --cov --cov-report=term --cov-fail-under=85 $(PYTEST_ARGS)
+test: $(VENV)/.installed-dev  ## install and run the tests but the long ones
+	$(BIN)/python -m pytest -m "not slow" -n auto --dist loadfile --cov --cov-report=term --cov-fail-under=85 $(PYTEST_ARGS)
+
+test-all: $(VENV)/.installed-dev  ## install and run all tests
+	$(BIN)/python -m pytest -n auto --dist loadfile $(PYTEST_ARGS)
 
 lint: $(VENV)/.installed-dev  ## style, types, dependency rule, spelling
 	$(BIN)/ruff check .

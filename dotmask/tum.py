@@ -3,19 +3,15 @@
 A trajectory is a text file of lines `timestamp tx ty tz qx qy qz qw` (`T_world_camera`, seconds and metres). A sequence
 folder holds `rgb/*.png`, `depth/*.png` (16 bit, 5000 per metre, 0 = no return), the lists `rgb.txt`, `depth.txt` and
 `associations.txt`, and `groundtruth.txt`. The format itself has no place for the intrinsics; the file
-`intrinsics.json` is our addition.
+`camera.json` is our addition.
 """
 
 import json
 import math
 import os
-import shutil
-import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 import cv2
 import numpy as np
@@ -23,6 +19,7 @@ from scipy.spatial.transform import Rotation
 
 from dotmask.atomic_file import write_atomically
 from dotmask.errors import SequenceFolderError, TrajectoryFileError
+from dotmask.partial_folder import GrowingFiles
 from dotmask.records import (
     ColourImage,
     DepthImage,
@@ -42,7 +39,8 @@ MAX_DEPTH_M = np.iinfo(np.uint16).max / DEPTH_PER_METRE
 """13.107 m, the furthest depth that 16 bits hold."""
 
 MAX_STAMP_DIFFERENCE_S = 0.02
-INTRINSICS_FILE = "intrinsics.json"
+CAMERA_FILE = "camera.json"
+LIST_HEADER = "# timestamp filename\n"
 TRAJECTORY_HEADER = "# timestamp tx ty tz qx qy qz qw\n"
 MIN_QUATERNION_NORM = 1e-6
 
@@ -97,51 +95,36 @@ def read_trajectory(path: PathLike) -> Trajectory:
 
 
 class TumSequenceWriter:
-    """Writes a sequence folder frame by frame; the folder appears when all is written.
+    """Writes a sequence folder frame by frame.
 
     ::
 
-        with TumSequenceWriter(folder, intrinsics) as writer:
-            for frame, T_world_camera in ...:
-                writer.write(frame, T_world_camera)
+        folder = PartialFolder.create(path, {})
+        writer = TumSequenceWriter(folder.files, intrinsics)
+        writer.begin()
+        for frame, T_world_camera in ...:
+            writer.write(frame, T_world_camera)
+        folder.finish()
 
-    The frames go to a temporary folder beside the target, which is renamed at the end of the `with` block. When the
-    block ends by an exception, the temporary folder is removed and nothing is left behind. Depth beyond
-    `MAX_DEPTH_M` does not fit the format and becomes 0, no return.
+    Depth beyond `MAX_DEPTH_M` does not fit the format and becomes 0, no return.
 
     Args:
-        folder: the target; it must not exist or be empty.
-        intrinsics: of all frames; written to `intrinsics.json`.
-
-    Raises:
-        SequenceFolderError: (on entering the block) the target holds something already or is a file.
+        files: of the folder.
+        intrinsics: of all frames.
+        facts: what else to note in `camera.json`.
     """
 
-    def __init__(self, folder: PathLike, intrinsics: Intrinsics) -> None:
-        self._folder = Path(folder)
-        self._intrinsics = intrinsics
-        self._temporary: Path | None = None
-        self._stamps: list[str] = []
-        self._poses: list[str] = []
+    def __init__(self, files: GrowingFiles, intrinsics: Intrinsics, facts: Mapping[str, object] | None = None) -> None:
+        self._files, self._intrinsics, self._facts = files, intrinsics, dict(facts or {})
+        self._last_s = -math.inf
 
-    def __enter__(self) -> Self:
-        """Make the temporary folder."""
-        if self._folder.exists() and not (self._folder.is_dir() and not any(self._folder.iterdir())):
-            raise SequenceFolderError(f"{self._folder}: exists and is not an empty folder; choose another or remove it")
-        parent = self._folder.absolute().parent
-        parent.mkdir(parents=True, exist_ok=True)
-        # mkdtemp gives a private folder; the sequence itself goes one level below, so that it gets usual permissions.
-        self._temporary = Path(tempfile.mkdtemp(prefix=f".{self._folder.name}.", suffix=".tmp", dir=parent))
+    def begin(self) -> None:
+        """Write the headers of the lists, and `camera.json`."""
         for name in ("rgb", "depth"):
-            (self._temporary / "sequence" / name).mkdir(parents=True)
-        return self
-
-    @property
-    def path(self) -> Path:
-        """The folder that is being written, for further files beside the images; only inside the `with` block."""
-        if self._temporary is None:
-            raise SequenceFolderError(f"{self._folder}: files can be written only inside the with block")
-        return self._temporary / "sequence"
+            self._files.append(f"{name}.txt", LIST_HEADER)
+        self._files.append("associations.txt", "")
+        self._files.append("groundtruth.txt", TRAJECTORY_HEADER)
+        self._files.write(CAMERA_FILE, camera_json(self._intrinsics, DEPTH_PER_METRE, self._facts))
 
     def write(self, frame: RgbdFrame, T_world_camera: FloatArray | None = None) -> None:
         """Append one frame, and its line of `groundtruth.txt` where the true pose (4, 4) is given.
@@ -149,45 +132,55 @@ class TumSequenceWriter:
         Raises:
             ValueError: the frame's intrinsics are not those of the writer, or its time stamp is not at least a
                 microsecond (the resolution of the file names) later than the one before.
-            SequenceFolderError: called outside of the `with` block.
         """
-        sequence = self.path
         if frame.intrinsics != self._intrinsics:
             raise ValueError(f"frame {frame.index}: its intrinsics are not those of the sequence")
-        stamp = f"{frame.timestamp_s:.6f}"
-        if self._stamps and float(stamp) <= float(self._stamps[-1]):
-            raise ValueError(f"frame {frame.index}: time {stamp} is not later than the one before, {self._stamps[-1]}")
-        (sequence / "rgb" / f"{stamp}.png").write_bytes(_png(frame.rgb[..., ::-1]))
-        (sequence / "depth" / f"{stamp}.png").write_bytes(_png(_sixteen_bit_depth(frame.depth_m)))
-        self._stamps.append(stamp)
+        stamp = stamp_text(frame.timestamp_s)
+        if float(stamp) <= self._last_s:
+            raise ValueError(f"frame {frame.index}: time {stamp} is not later than the one before, {self._last_s:.6f}")
         if T_world_camera is not None:
             pose = checked(T_world_camera, "T_world_camera", (4, 4), np.float64)
             check_finite(pose, "T_world_camera")
-            self._poses.append(_pose_line(frame.timestamp_s, pose))
+            self._files.append("groundtruth.txt", _pose_line(frame.timestamp_s, pose))
+        self._last_s = float(stamp)
+        colour, depth = f"rgb/{stamp}.png", f"depth/{stamp}.png"
+        self._files.write(colour, colour_png(frame.rgb))
+        self._files.write(depth, depth_png(frame.depth_m, DEPTH_PER_METRE))
+        self._files.append("rgb.txt", f"{stamp} {colour}\n")
+        self._files.append("depth.txt", f"{stamp} {depth}\n")
+        self._files.append("associations.txt", f"{stamp} {colour} {stamp} {depth}\n")
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        """Write the lists and rename the folder, or remove it after an exception."""
-        assert self._temporary is not None
-        temporary, self._temporary = self._temporary, None
-        try:
-            if kind is None:
-                self._write_lists(temporary / "sequence")
-                os.replace(temporary / "sequence", self._folder)
-        finally:
-            shutil.rmtree(temporary)
 
-    def _write_lists(self, sequence: Path) -> None:
-        for name in ("rgb", "depth"):
-            lines = [f"{stamp} {name}/{stamp}.png\n" for stamp in self._stamps]
-            (sequence / f"{name}.txt").write_text("# timestamp filename\n" + "".join(lines))
-        lines = [f"{stamp} rgb/{stamp}.png {stamp} depth/{stamp}.png\n" for stamp in self._stamps]
-        (sequence / "associations.txt").write_text("".join(lines))
-        if self._poses:
-            (sequence / "groundtruth.txt").write_text(TRAJECTORY_HEADER + "".join(self._poses))
-        camera = {**asdict(self._intrinsics), "depth_per_metre": DEPTH_PER_METRE}
-        (sequence / INTRINSICS_FILE).write_text(json.dumps(camera, indent=2) + "\n")
+def camera_json(intrinsics: Intrinsics, depth_per_metre: float | None, facts: Mapping[str, object]) -> str:
+    """The content of `camera.json`: intrinsics, the scale of the depth images (None without such) and other facts."""
+    return json.dumps({**asdict(intrinsics), "depth_per_metre": depth_per_metre, **facts}, indent=2) + "\n"
+
+
+def stamp_text(timestamp_s: float) -> str:
+    """A time stamp as in the names of images, in microseconds."""
+    return f"{timestamp_s:.6f}"
+
+
+def colour_png(rgb: ColourImage) -> bytes:
+    """A colour image (H, W, 3) as the bytes of a PNG file."""
+    return _png(rgb[..., ::-1])
+
+
+def depth_png(depth_m: DepthImage, per_metre: float) -> bytes:
+    """A depth image (H, W) in metres as a 16-bit PNG file; what 16 bits do not hold becomes 0, no return."""
+    steps = np.rint(depth_m * per_metre)
+    return ids_png(np.where((steps > 0) & (steps <= np.iinfo(np.uint16).max), steps, 0).astype(np.uint16))
+
+
+def ids_png(ids: np.ndarray[tuple[int, ...], np.dtype[np.uint16]]) -> bytes:
+    """An image of 16-bit numbers (H, W) as the bytes of a PNG file."""
+    return _png(ids)
+
+
+def pose_columns(T_a_b: FloatArray) -> tuple[float, ...]:
+    """`tx ty tz qx qy qz qw` of a pose (4, 4), with the quaternion of positive `qw`."""
+    quaternion = Rotation.from_matrix(T_a_b[:3, :3]).as_quat(canonical=True)
+    return tuple(float(x) for x in (*T_a_b[:3, 3], *quaternion))
 
 
 def read_sequence(folder: PathLike, intrinsics: Intrinsics | None = None) -> Iterator[RgbdFrame]:
@@ -198,7 +191,7 @@ def read_sequence(folder: PathLike, intrinsics: Intrinsics | None = None) -> Ite
 
     Args:
         folder: the sequence.
-        intrinsics: of the camera; None to read `intrinsics.json`.
+        intrinsics: of the camera; None to read `camera.json`.
 
     Raises:
         SequenceFolderError: a list, an image or the intrinsics are missing or cannot be read, no pair of stamps is
@@ -230,12 +223,12 @@ def read_sequence(folder: PathLike, intrinsics: Intrinsics | None = None) -> Ite
 
 
 def read_intrinsics(folder: PathLike) -> Intrinsics:
-    """The intrinsics that `TumSequenceWriter` left in `intrinsics.json`.
+    """The intrinsics that `TumSequenceWriter` left in `camera.json`.
 
     Raises:
         SequenceFolderError: the file is missing, is not such a file, or tells another scale of depth.
     """
-    path = Path(folder) / INTRINSICS_FILE
+    path = Path(folder) / CAMERA_FILE
     try:
         values = json.loads(path.read_text(encoding="utf-8"))
         scale = float(values.get("depth_per_metre", DEPTH_PER_METRE))
@@ -256,8 +249,7 @@ def read_intrinsics(folder: PathLike) -> Intrinsics:
 
 
 def _pose_line(time_s: float, T_world_camera: FloatArray) -> str:
-    quaternion = Rotation.from_matrix(T_world_camera[:3, :3]).as_quat(canonical=True)
-    return " ".join(repr(float(x)) for x in (time_s, *T_world_camera[:3, 3], *quaternion)) + "\n"
+    return " ".join(repr(x) for x in (float(time_s), *pose_columns(T_world_camera))) + "\n"
 
 
 def _table(path: PathLike, error_type: type[Exception]) -> Iterator[tuple[str, list[str]]]:
@@ -298,11 +290,6 @@ def _read_list(path: Path) -> tuple[FloatArray, list[str]]:
 def _png(image: ColourImage | np.ndarray[tuple[int, ...], np.dtype[np.uint16]]) -> bytes:
     _, data = cv2.imencode(".png", image)
     return bytes(data)
-
-
-def _sixteen_bit_depth(depth_m: DepthImage) -> np.ndarray[tuple[int, ...], np.dtype[np.uint16]]:
-    holds = (depth_m > 0) & (depth_m <= MAX_DEPTH_M)
-    return np.rint(np.where(holds, depth_m, 0.0) * DEPTH_PER_METRE).astype(np.uint16)
 
 
 def _read_colour(path: Path, camera: Intrinsics) -> ColourImage:

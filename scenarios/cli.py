@@ -32,13 +32,15 @@ app = typer.Typer(
 )
 
 Name = Annotated[str, typer.Argument(help="A scenario; `dotmask list` names them.", show_default=False)]
+OptionalName = Annotated[str | None, typer.Argument(help="A scenario; `dotmask list` names them.", show_default=False)]
+Source = Annotated[Path | None, typer.Option("--from", help="Repeat the scenario.json of another run or render.")]
 Overrides = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="Change one value, e.g. camera.speed=2. May be repeated."),
 ]
 Seed = Annotated[int | None, typer.Option(help="Another seed for the office's looks and the sensor's noise.")]
 Frames = Annotated[int | None, typer.Option(help="Number of frames.")]
-Renderer = Annotated[str, typer.Option(help="Renderer: numba.")]
+Renderer = Annotated[str, typer.Option(help="Renderer: numba, pyrender.")]
 Threads = Annotated[int, typer.Option(min=1, max=64, help="Threads of the renderer. The bytes do not depend on it.")]
 
 
@@ -52,16 +54,25 @@ def _progress() -> Iterator["Progress"]:
         BarColumn,
         MofNCompleteColumn,
         Progress,
+        ProgressColumn,
+        Task,
         TextColumn,
         TimeElapsedColumn,
         TimeRemainingColumn,
     )
+    from rich.text import Text
+
+    class Rate(ProgressColumn):
+        def render(self, task: Task) -> Text:
+            speed = task.finished_speed or task.speed
+            return Text("-/s" if speed is None else f"{speed:.1f}/s")
 
     columns = (
         TextColumn("{task.description}"),
-        BarColumn(),
+        BarColumn(bar_width=20),
         MofNCompleteColumn(),
-        TextColumn("frames, elapsed"),
+        TextColumn("frames"),
+        Rate(),
         TimeElapsedColumn(),
         TextColumn("left"),
         TimeRemainingColumn(),
@@ -135,33 +146,63 @@ def show(name: Name, overrides: Overrides = None) -> None:
 
 @app.command()
 def render(
-    name: Name,
     out: Annotated[Path, typer.Option(help="New or empty folder for the sequence.", show_default=False)],
+    name: OptionalName = None,
+    source: Source = None,
+    format_name: Annotated[
+        str, typer.Option("--format", help="tum (RGB-D benchmark), coco (annotations) or kitti (odometry).")
+    ] = "tum",
     overrides: Overrides = None,
     seed: Seed = None,
     frames: Frames = None,
     renderer: Renderer = "numba",
     threads: Threads = 2,
+    video: Annotated[bool, typer.Option(help="Write video.mp4 too: colour, depth and masks side by side.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue an interrupted render of the same.")] = False,
 ) -> None:
-    """Render a scenario into a TUM RGB-D folder, with true masks and object trajectories beside it.
+    """Render a scenario into a folder of images with the complete truth beside them.
 
-    Example:  dotmask render smoke --out sequences/smoke
+    Examples:  dotmask render smoke --out sequences/smoke --video
+
+    dotmask render fr3_walking_xyz --format coco --out data/walking
     """
-    from scenarios.render import render_sequence
+    from scenarios.export.render import render_sequence
 
-    scenario = _resolve(name, None, overrides, seed, frames)
+    scenario = _resolve(name, source, overrides, seed, frames)
+    done: int | None = None
     with _progress() as progress:
         task = progress.add_task(f"render {scenario.name}", total=scenario.frames)
-        render_sequence(scenario, out, renderer, threads, lambda: progress.advance(task))
+
+        def show(frames_done: int) -> None:
+            nonlocal done
+            if done is None:  # frames of an earlier process say nothing about this one's speed
+                progress.reset(task, completed=frames_done)
+            progress.update(task, completed=frames_done)
+            done = frames_done
+
+        try:
+            render_sequence(
+                scenario,
+                out,
+                format_name=format_name,
+                renderer=renderer,
+                threads=threads,
+                video=video,
+                resume=resume,
+                show=show,
+            )
+        except KeyboardInterrupt:
+            progress.stop()
+            kept = f"{done} frames are kept; continue with --resume" if done else "nothing was written"
+            typer.echo(f"dotmask: interrupted; {kept}", err=True)
+            raise typer.Exit(130) from None
     typer.echo(str(out))
 
 
 @app.command()
 def run(
-    name: Annotated[
-        str | None, typer.Argument(help="A scenario; `dotmask list` names them.", show_default=False)
-    ] = None,
-    source: Annotated[Path | None, typer.Option("--from", help="Repeat the scenario.json of another run.")] = None,
+    name: OptionalName = None,
+    source: Source = None,
     methods: Annotated[str, typer.Option(help="Comma-separated: unmasked, mdi, dotmask.")] = "unmasked,mdi,dotmask",
     segmenter: Annotated[str, typer.Option(help="Segmenter: oracle.")] = "oracle",
     slam: Annotated[str, typer.Option(help="SLAM back end: embedded.")] = "embedded",
@@ -225,6 +266,50 @@ def run(
         measured = "not measured" if value is None else f"{value:.6g}"
         typer.echo(f"{'holds ' if holds else 'MISSED'} {wanted.method}.{wanted.text}: {measured}", err=True)
     if missed:
+        raise typer.Exit(1)
+
+
+@app.command()
+def check(
+    names: Annotated[
+        list[str] | None, typer.Argument(help="Scenarios; `dotmask list` names them.", show_default=False)
+    ] = None,
+    everything: Annotated[bool, typer.Option("--all", help="Every scenario.")] = False,
+    frames: Annotated[int, typer.Option(min=1, help="How many frames of each to look at.")] = 3,
+    overrides: Overrides = None,
+    seed: Seed = None,
+    renderer: Renderer = "numba",
+    threads: Threads = 2,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of the table.")] = False,
+) -> None:
+    """Check that the truth explains itself: depth, poses, flow, ids, normals, velocities, keypoints.
+
+    Exit code 1 when it does not.
+
+    Examples:  dotmask check smoke
+
+    dotmask check --all --frames 5
+    """
+    from scenarios.check.run import check_scenario, findings_json, table
+    from scenarios.registry import SCENARIOS
+
+    if bool(names) == everything:
+        raise ScenarioError("give names of scenarios, or --all, not both")
+    chosen = [_resolve(name, None, overrides, seed, None) for name in names or SCENARIOS]
+    findings = []
+    with _progress() as progress:
+        task = progress.add_task("check", total=frames * len(chosen))
+        for scenario in chosen:
+            progress.update(task, description=f"check {scenario.name}")
+            findings += check_scenario(scenario, frames, renderer, threads, lambda: progress.advance(task))
+    if as_json:
+        typer.echo(findings_json(findings), nl=False)
+    else:
+        _console().print(table(findings))
+    failed = [finding for finding in findings if not finding.passes]
+    for finding in failed:
+        typer.echo(f"FAILED {finding.scenario}, {finding.check.name}: {finding.check.what}", err=True)
+    if failed:
         raise typer.Exit(1)
 
 

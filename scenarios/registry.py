@@ -3,14 +3,24 @@
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from scenarios.catalog import fr3_sitting, fr3_walking, smoke
+from scenarios.catalog import (
+    fr2,
+    fr3_household,
+    fr3_sitting,
+    fr3_walking,
+    gatherings,
+    hard_views,
+    movers,
+    robot,
+    smoke,
+)
 from scenarios.errors import unknown
 from scenarios.spec import Scenario
 
 
 def _collect() -> dict[str, Scenario]:
     named: dict[str, Scenario] = {}
-    for module in (smoke, fr3_walking, fr3_sitting):
+    for module in (smoke, fr3_walking, fr3_sitting, fr2, fr3_household, robot, gatherings, hard_views, movers):
         for scenario in module.SCENARIOS:
             if scenario.name in named:
                 raise ValueError(f"two scenarios are called {scenario.name}")

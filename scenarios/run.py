@@ -121,8 +121,8 @@ class TimedFrame:
     seconds: float
 
 
-def rendered_ahead(simulator: Simulator) -> Iterator[TimedFrame]:
-    """The frames in order, made by a second thread a few frames ahead of the consumer."""
+def rendered_ahead(simulator: Simulator, first: int = 0) -> Iterator[TimedFrame]:
+    """The frames from `first` on in order, made by a second thread a few frames ahead of the consumer."""
 
     def make(index: int) -> TimedFrame:
         start = time.perf_counter()
@@ -132,7 +132,7 @@ def rendered_ahead(simulator: Simulator) -> Iterator[TimedFrame]:
     pending: deque[Future[TimedFrame]] = deque()
     with ThreadPoolExecutor(max_workers=1, thread_name_prefix="render") as pool:
         try:
-            for index in range(len(simulator)):
+            for index in range(first, len(simulator)):
                 pending.append(pool.submit(make, index))
                 if len(pending) > FRAMES_AHEAD:
                     yield pending.popleft().result()
@@ -189,14 +189,14 @@ def run(scenario: Scenario, settings: RunSettings, out: Path, advance: Callable[
         report = Report(
             scenario=scenario.name,
             seed=scenario.seed,
-            frames=scenario.frames,
+            frames=len(simulator),
             renderer=settings.renderer,
             segmenter=settings.segmenter,
             slam=settings.slam,
             profile=settings.profile,
             frame_hash=digest.hexdigest(),
             methods={name: judge.report() for name, judge in judges.items()},
-            time_ms=WorldTimes(render=1e3 * render_seconds / scenario.frames),
+            time_ms=WorldTimes(render=1e3 * render_seconds / len(simulator)),
         )
         folder.write("trajectory_truth.txt", format_trajectory(judges[settings.methods[0]].truth_trajectory()))
         for name, judge in judges.items():

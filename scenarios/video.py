@@ -1,7 +1,11 @@
-"""Pictures of a run: what the camera saw, what the method decided, what SLAM was given, and where everybody went."""
+"""Pictures of a run: what the camera saw, what the method decided, what SLAM was given, and where everybody went.
 
-from collections.abc import Mapping
+And of a rendered sequence: what the camera saw, and the truth about it.
+"""
+
+from collections.abc import Collection, Mapping
 from pathlib import Path
+from typing import Self
 
 import cv2
 import numpy as np
@@ -112,30 +116,60 @@ def mosaic(panels: list[tuple[str, Picture]]) -> Picture:
     return np.vstack([np.hstack(pictures[:2]), np.hstack(pictures[2:])])
 
 
+class VideoFile:
+    """An mp4 file in the making.
+
+    Args:
+        path: of the file.
+        rate_hz: pictures a second.
+        size: width and height.
+
+    Raises:
+        ScenarioError: OpenCV has no encoder for it here.
+    """
+
+    def __init__(self, path: Path, rate_hz: float, size: tuple[int, int]) -> None:
+        self._size = size
+        self._writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), rate_hz, size)
+        if not self._writer.isOpened():
+            raise ScenarioError("--video: this build of OpenCV cannot write mp4 files; run without --video")
+
+    def add(self, picture: Picture) -> None:
+        """Append a picture, reduced to the size of the video."""
+        if picture.shape[1::-1] != self._size:
+            picture = np.asarray(cv2.resize(picture, self._size, interpolation=cv2.INTER_AREA), np.uint8)
+        self._writer.write(cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))
+
+    def close(self) -> None:
+        """Finish the file."""
+        self._writer.release()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
+
 class Video:
-    """Writes the mosaic of every frame to an mp4 file.
+    """Writes the mosaic of every frame of a run to an mp4 file.
 
     Raises:
         ScenarioError: OpenCV has no encoder for it here.
     """
 
     def __init__(self, path: Path, scenario: Scenario, methods: tuple[str, ...]) -> None:
-        width, height = scenario.camera.width, scenario.camera.height
         self._shown = "dotmask" if "dotmask" in methods else methods[-1]
-        self._size = (3 * width // 2, 3 * height // 2)
-        self._writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), scenario.frame_rate_hz, self._size)
-        if not self._writer.isOpened():
-            raise ScenarioError("--video: this build of OpenCV cannot write mp4 files; run without --video")
+        size = (3 * scenario.camera.width // 2, 3 * scenario.camera.height // 2)
+        self._file = VideoFile(path, scenario.frame_rate_hz, size)
 
     def add(self, frame: SimFrame, results: Mapping[str, FrameResult], paths: PathsPanel) -> None:
         """Append one frame; `paths` holds the positions up to it."""
-        picture = frame_picture(frame, results[self._shown], paths)
-        smaller = cv2.resize(picture, self._size, interpolation=cv2.INTER_AREA)
-        self._writer.write(cv2.cvtColor(smaller, cv2.COLOR_RGB2BGR))
+        self._file.add(frame_picture(frame, results[self._shown], paths))
 
     def close(self) -> None:
         """Finish the file."""
-        self._writer.release()
+        self._file.close()
 
 
 def frame_picture(frame: SimFrame, result: FrameResult, paths: PathsPanel) -> Picture:
@@ -149,3 +183,40 @@ def frame_picture(frame: SimFrame, result: FrameResult, paths: PathsPanel) -> Pi
             ("", np.asarray(cv2.resize(paths.draw(), frame.rgb.shape[1::-1], interpolation=cv2.INTER_AREA), np.uint8)),
         ]
     )
+
+
+def truth_picture(frame: SimFrame, actors: Collection[int]) -> Picture:
+    """Colour, measured depth and true masks of one frame side by side; whoever moves has a red outline.
+
+    Args:
+        frame: to show.
+        actors: instance ids of what can move: shown in bright colours, the rest in dull ones.
+    """
+    panels = [
+        ("colour", frame.rgb.copy()),
+        ("depth", depth_panel(frame.depth_m)),
+        ("masks", _masks_panel(frame, actors)),
+    ]
+    for title, panel in panels:
+        _label(panel, title, (12, panel.shape[0] - 12))
+    return np.hstack([panel for _, panel in panels])
+
+
+def _masks_panel(frame: SimFrame, actors: Collection[int]) -> Picture:
+    ids = frame.truth.instance_ids
+    # Hues by the golden ratio: neighbouring ids differ most. OpenCV's hue runs to 180.
+    numbers = np.arange(int(ids.max()) + 1)
+    hsv = np.zeros((len(numbers), 1, 3), np.uint8)
+    hsv[:, 0, 0] = (numbers * 0.61803398875 % 1.0 * 180).astype(np.uint8)
+    bright = np.isin(numbers, list(actors))
+    hsv[:, 0, 1], hsv[:, 0, 2] = np.where(bright, 190, 70), np.where(bright, 240, 95)
+    colours = cv2.cvtColor(hsv, cv2.COLOR_HSV2RGB)[:, 0]
+    colours[0] = BACKGROUND
+    picture = np.asarray(colours[ids], np.uint8)
+    for actor in frame.truth.objects:
+        if actor.visible_pixels and actor.is_moving:
+            outline, _ = cv2.findContours(
+                (ids == actor.instance_id).view(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE
+            )
+            cv2.drawContours(picture, outline, -1, MOVING, 2)
+    return picture

@@ -52,6 +52,21 @@ class Surface:
             raise ValueError("a skinned surface needs bones and weights")
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class KeypointRig:
+    """The 17 COCO keypoints at rest, moved by the palette like vertices.
+
+    Attributes:
+        points: (17, 3) float64 metres, in COCO's order.
+        bones: (17, 4) int32 bone indices.
+        weights: (17, 4) float64, sum to 1.
+    """
+
+    points: FloatArray
+    bones: npt.NDArray[np.int32]
+    weights: FloatArray
+
+
 class Motion(Protocol):
     """Where an object is: a pure function of time, so any frame can be rendered alone."""
 
@@ -83,6 +98,25 @@ class Placed:
         return self.T_world_object
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Frozen:
+    """A motion stopped at time 0.
+
+    Attributes:
+        motion: what would have moved.
+    """
+
+    motion: Motion
+
+    def palette_at(self, time_s: float) -> FloatArray:
+        """(B, 4, 4), always the same."""
+        return self.motion.palette_at(0.0)
+
+    def pose_at(self, time_s: float) -> FloatArray:
+        """(4, 4), always the same."""
+        return self.motion.pose_at(0.0)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SceneObject:
     """One thing in the world.
@@ -94,6 +128,7 @@ class SceneObject:
         surfaces: its parts, all posed by the one palette.
         motion: where it is over time.
         is_actor: whether it can move, hence whether its truth is stated per frame.
+        keypoints: of a person.
     """
 
     name: str
@@ -102,6 +137,7 @@ class SceneObject:
     surfaces: tuple[Surface, ...]
     motion: Motion
     is_actor: bool = False
+    keypoints: KeypointRig | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

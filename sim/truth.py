@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sim.geometry import FloatArray
+from sim.people.keypoints import keypoints_truth
 from sim.records import CameraModel, ObjectTruth, RenderedImages
 from sim.scene import SceneObject
 
@@ -157,6 +158,9 @@ def object_truth(
         occlusion=1.0 - min(visible / unoccluded, 1.0) if unoccluded else 0.0,
         is_truncated=visible > 0 and border,
         ideal_world=ideal,
+        keypoints=None
+        if obj.keypoints is None
+        else keypoints_truth(obj.keypoints, palette_now, obj.instance_id, images, camera, T_world_camera),
     )
 
 

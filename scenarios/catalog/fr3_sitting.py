@@ -3,7 +3,7 @@
 One sits and gestures, one stands and talks: objects of interest that hardly move and carry many useful features.
 """
 
-from scenarios.spec import CameraSpec, ChairSpec, PeopleSpec, PersonSpec, Scenario
+from scenarios.spec import CameraSpec, PeopleSpec, PersonSpec, Scenario, SitAct, StandAct, ThingSpec
 
 PEOPLE = PeopleSpec(
     cast=(
@@ -11,42 +11,42 @@ PEOPLE = PeopleSpec(
             name="anton",
             character="man",
             outfit="plaid",
-            action="sit",
-            waypoints_m=((-0.75, 0.5),),
-            heading_deg=-60,
-            amplitude=0.5,
+            seated_on="chair_left",
+            acts=(SitAct(duration_s=3600.0, amplitude=0.5),),
         ),
         PersonSpec(
             name="berta",
             character="woman",
             outfit="stripes",
-            action="stand",
-            waypoints_m=((0.85, 0.35),),
+            position_m=(0.85, 0.35),
             heading_deg=-110,
-            amplitude=0.5,
+            acts=(StandAct(duration_s=3600.0, amplitude=0.5),),
         ),
     )
 )
 
 CHAIRS = (
-    ChairSpec(name="chair_left", position_m=(-0.75, 0.5), heading_deg=-60, colour="blue"),
-    ChairSpec(name="chair_right", position_m=(1.5, 0.7), heading_deg=130, colour="black"),
+    ThingSpec(name="chair_left", kind="chair", look="blue", position_m=(-0.75, 0.5, 0.0), heading_deg=-60),
+    ThingSpec(name="chair_right", kind="chair", look="black", position_m=(1.5, 0.7, 0.0), heading_deg=130),
 )
 
 
-def _sitting(path: str, frames: int, motion: str) -> Scenario:
+def _sitting(path: str, frames: int, motion: str, *, amplitude: float, translation: float) -> Scenario:
+    camera = CameraSpec.model_validate({"path": path, "amplitude": amplitude, "translation": translation})
     return Scenario(
         name=f"fr3_sitting_{path}",
         description=f"One person sits, one stands, with small motions; the camera {motion}.",
         tags=("paper", "sitting"),
         frames=frames,
-        camera=CameraSpec.model_validate({"path": path}),
+        camera=camera,
         people=PEOPLE,
-        chairs=CHAIRS,
+        things=CHAIRS,
     )
 
 
 SCENARIOS = (
-    _sitting("static", 708, "is held still by hand"),
-    _sitting("xyz", 1275, "moves along its three axes"),
+    _sitting("static", 709, "is held still by hand", amplitude=1.2, translation=0.78),
+    _sitting("xyz", 1276, "moves along its three axes", amplitude=0.64, translation=1.0),
+    _sitting("rpy", 826, "turns about its three axes", amplitude=1.13, translation=0.4),
+    _sitting("halfsphere", 1117, "moves on a half sphere", amplitude=1.04, translation=0.78),
 )

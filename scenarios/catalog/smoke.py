@@ -11,6 +11,6 @@ SCENARIOS = (
         frames=60,
         camera=CameraSpec(width=320, height=240, fx=267.7, fy=269.6, cx=159.8, cy=123.55),
         people=PEOPLE,
-        chairs=CHAIRS,
+        things=CHAIRS,
     ),
 )

@@ -20,10 +20,8 @@ BLOCK = 64
 """Pixels shaded together. Its scratch rows have a constant distance, so LLVM can prove that they do not overlap and
 vectorise the lighting."""
 
-TEXEL_AREA_MAX = f32(2.0)
-"""Texels per pixel (area) from which the next mip level is used alone."""
-BLEND_FROM = f32(1.0)
-"""Texels per pixel (area) from which the next mip level is mixed in."""
+AREA_MAX = f32(2.0**40)
+"""Texels per pixel beyond every texture."""
 
 SHADOW_NEAR = f32(0.05)
 SHADOW_TANGENT = 2.75
@@ -36,11 +34,14 @@ BRIGHTNESS_KNEE = f32(0.7)
 """Brightness above it is compressed and stays below 1: no channel burns out."""
 
 
+FIELDS = 0x0000FF0000FF00FF
+
+
 @njit(**KERNEL)
 def spread(texel):
-    """0x00bbggrr to three 16-bit fields, so that one multiplication serves three channels."""
+    """0x00bbggrr to FIELDS: red, blue and green, each with room for a product with 256."""
     t = np.int64(texel)
-    return (t & 0xFF) | ((t & 0xFF00) << 8) | ((t & 0xFF0000) << 16)
+    return (t | (t << 32)) & FIELDS
 
 
 @njit(**KERNEL)
@@ -59,7 +60,7 @@ def bilinear(texels, level, size, u, v):
     total += spread(texels[np.uint64(top + u1)]) * (weight_u - w11)
     total += spread(texels[np.uint64(bottom + u0)]) * (weight_v - w11)
     total += spread(texels[np.uint64(bottom + u1)]) * w11
-    return (total >> 8) & 0xFF00FF00FF
+    return (total >> 8) & FIELDS
 
 
 @njit(**KERNEL)
@@ -100,7 +101,9 @@ def shade(
     neighbours on one triangle share a lane of the lighting.
     """
     one, half, zero = f32(1), f32(0.5), f32(0)
-    u1, u3 = np.uint64(1), np.uint64(3)
+    u1, u2, u3 = np.uint64(1), np.uint64(2), np.uint64(3)
+    flat_t, flat_w = triangles.ravel(), inverse_depth.ravel()
+    flat_rgb, flat_depth, flat_ids = rgb.ravel(), depth.ravel(), ids.ravel()
     width = triangles.shape[1]
     inverse_fx, inverse_fy = 1.0 / fx, 1.0 / fy
     inverse_focals = inverse_fx * inverse_fy
@@ -115,7 +118,9 @@ def shade(
     # Rows of the scratch, by pixel: 0-1 uv, 2 texels per pixel; by lane: 3-5 normal, 6 ray x, 7 z, 8-10 position,
     # 11 brightness, 12 one light's share, 13-14 shadow texel, 15 limit of 1/z in the shadow map.
     s = np.zeros(16 * BLOCK, np.float32)
-    face_of = np.zeros(BLOCK, np.int64)
+    bits = s.view(np.int32)
+    face_of, level_of = np.zeros(BLOCK, np.int32), np.zeros(BLOCK, np.int32)
+    size_of, origin_of = np.zeros(BLOCK, np.int32), np.zeros(BLOCK, np.int32)
     lane_of = np.zeros(BLOCK, np.int64)
     for y in range(row_first, row_last):
         ray_y = (y - cy) * inverse_fy
@@ -128,17 +133,19 @@ def shade(
             previous, lanes, is_open = -1, 0, False
             i = j = k = np.uint32(0)
             q1x = q1 = q2x = q2 = density = zero
+            side = origin = np.int32(0)
             for n in range(count):
                 x = x_first + n
-                t = triangles[y, x]
+                pixel = np.uint64(y * width + x)
+                t = flat_t[pixel]
                 face_of[n] = t
                 if t < 0:
-                    rgb[y, x, 0] = rgb[y, x, 1] = rgb[y, x, 2] = 0
-                    depth[y, x] = 0
-                    ids[y, x] = 0
+                    flat_rgb[u3 * pixel] = flat_rgb[u3 * pixel + u1] = flat_rgb[u3 * pixel + u2] = 0
+                    flat_depth[pixel] = 0
+                    flat_ids[pixel] = 0
                     continue
-                z = one / inverse_depth[y, x]
-                depth[y, x] = z
+                z = one / flat_w[pixel]
+                flat_depth[pixel] = z
                 if t != previous:  # neighbours mostly share the triangle: keep its constants
                     previous, is_open = t, False
                     face = np.uint32(t)
@@ -151,13 +158,15 @@ def shade(
                     inverse_det = 1.0 / (bx * e1x + by * e1y + bz * e1z)
                     q1x, q2x = f32(e1x * inverse_det), f32(e2x * inverse_det)
                     q1, q2 = f32((e1y * ray_y + e1z) * inverse_det), f32((e2y * ray_y + e2z) * inverse_det)
-                    size = np.float64(texture_size[face_texture[face]])
+                    texture = np.uint32(face_texture[face])
+                    side, origin = texture_size[texture], texture_offset[texture]
+                    size = np.float64(side)
                     du1, dv1 = attributes[j, 6] - attributes[i, 6], attributes[j, 7] - attributes[i, 7]
                     du2, dv2 = attributes[k, 6] - attributes[i, 6], attributes[k, 7] - attributes[i, 7]
                     uv_area = abs(du1 * dv2 - dv1 * du2)
                     density = f32(size * size * uv_area * abs(inverse_det) * inverse_focals)
                     identity = face_id[face]
-                ids[y, x] = identity
+                flat_ids[pixel] = identity
                 ray_x = f32((x - cx) * inverse_fx)
                 # Rounding must not leave the triangle: the thinner it is, the farther it would lead.
                 b1 = min(max((q1x * ray_x + q1) * z, zero), one)
@@ -166,6 +175,7 @@ def shade(
                 s[n] = attributes[i, 6] * b0 + attributes[j, 6] * b1 + attributes[k, 6] * b2
                 s[BLOCK + n] = attributes[i, 7] * b0 + attributes[j, 7] * b1 + attributes[k, 7] * b2
                 s[2 * BLOCK + n] = density * z * z * z
+                size_of[n], origin_of[n] = side, origin
                 if is_open:
                     is_open = False
                 else:
@@ -249,30 +259,37 @@ def shade(
                     brightness = brightness if brightness < BRIGHTNESS_KNEE else BRIGHTNESS_KNEE
                     s[11 * BLOCK + n] = (brightness + room * over / (over + room)) * f32(256)
 
-            for n in range(count):
-                t = face_of[n]
-                if t < 0:
-                    continue
-                texture = face_texture[np.uint64(t)]
-                size, level = np.int64(texture_size[texture]), np.int64(texture_offset[texture])
+            # Mip level: the exponent of 4 in the texels per pixel, and how far it is to the next one.
+            for n in range(BLOCK):
                 area = s[2 * BLOCK + n]
-                while area > TEXEL_AREA_MAX and size > 1:
-                    area *= f32(0.25)
-                    level += size * size
-                    size >>= 1
+                area = area if area > one else one
+                s[2 * BLOCK + n] = area if area < AREA_MAX else AREA_MAX
+            for n in range(BLOCK):
+                level = (bits[2 * BLOCK + n] - np.int32(127 << 23)) >> np.int32(24)
+                bits[2 * BLOCK + n] -= level << np.int32(24)
+                level_of[n] = level
+            for n in range(BLOCK):
+                s[2 * BLOCK + n] = (np.sqrt(s[2 * BLOCK + n]) - one) * f32(256)
+
+            for n in range(count):
+                if face_of[n] < 0:
+                    continue
+                full = np.int64(size_of[n])
+                size, blend = full >> level_of[n], np.int64(s[2 * BLOCK + n])
+                if size < 2:
+                    size, blend = 1, 0
+                level = origin_of[n] + (full * full - size * size) // 3 * 4  # the sum of the finer levels
                 u, v = s[n], s[BLOCK + n]
                 # Texel centres lie at half integers of u * size; 8 bits of fraction. size is a power of two, so &
                 # repeats the texture.
                 wide_u = np.int64((u - np.floor(u)) * f32(size << 8)) + (size << 8)
                 wide_v = np.int64((v - np.floor(v)) * f32(size << 8)) + (size << 8)
                 fields = bilinear(texels, level, size, wide_u - 128, wide_v - 128)
-                if area > BLEND_FROM and size > 1:  # between two mip levels
-                    blend = min(np.int64((area - BLEND_FROM) * (f32(256) / (TEXEL_AREA_MAX - BLEND_FROM))), 256)
-                    level += size * size
-                    coarse = bilinear(texels, level, size >> 1, (wide_u >> 1) - 128, (wide_v >> 1) - 128)
-                    fields = ((fields * (256 - blend) + coarse * blend) >> 8) & 0xFF00FF00FF
+                if blend > 0:  # trilinear
+                    coarse = bilinear(texels, level + size * size, size >> 1, (wide_u >> 1) - 128, (wide_v >> 1) - 128)
+                    fields = ((fields * (256 - blend) + coarse * blend) >> 8) & FIELDS
                 factor = np.int64(s[11 * BLOCK + lane_of[n]])
-                x = x_first + n
-                rgb[y, x, 0] = ((fields & 255) * factor) >> 8
-                rgb[y, x, 1] = (((fields >> 16) & 255) * factor) >> 8
-                rgb[y, x, 2] = (((fields >> 32) & 255) * factor) >> 8
+                pixel = u3 * np.uint64(y * width + x_first + n)
+                flat_rgb[pixel] = ((fields & 255) * factor) >> 8
+                flat_rgb[pixel + u1] = (((fields >> 40) & 255) * factor) >> 8
+                flat_rgb[pixel + u2] = (((fields >> 16) & 255) * factor) >> 8

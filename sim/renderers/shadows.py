@@ -12,12 +12,12 @@ import numpy.typing as npt
 from sim.geometry import FloatArray
 from sim.renderers import kernels, shading_kernels
 
-CASTER_CELL_M = 0.03
-"""Vertices of an actor in one cell of this size cast their shadow as one vertex."""
+RIGID_CELL_M, SKINNED_CELL_M = 0.03, 0.045
+"""Vertices of an actor in one cell of this size cast their shadow as one vertex. A rigid thing can have thin legs."""
 
 Float32Array = npt.NDArray[np.float32]
 FaceArray = npt.NDArray[np.uint32]
-Bands = Callable[[Callable[[int, int], None], int], None]
+Bands = Callable[[Callable[[int, int], None], int, int], None]
 
 
 def project(
@@ -61,7 +61,7 @@ def screen_box(camera: Float32Array, near: float, width: int, height: int) -> tu
 
 
 def simplified(
-    vertices: Float32Array, faces: FaceArray, groups: npt.NDArray[np.int32]
+    vertices: Float32Array, faces: FaceArray, groups: npt.NDArray[np.int32], cells_m: Float32Array
 ) -> tuple[npt.NDArray[np.int64], FaceArray]:
     """A coarser mesh by vertex clustering (Rossignac and Borrel, "Multi-resolution 3D approximations", 1993).
 
@@ -71,13 +71,14 @@ def simplified(
         vertices: (n, 3) at rest, metres.
         faces: (m, 3).
         groups: (n,) a number per vertex; vertices of different groups stay apart.
+        cells_m: (n,) side of the cells for each vertex, the same within a group.
 
     Returns:
         The vertices that are kept (k,), and faces (l, 3) that count in them.
     """
     if not len(faces):
         return np.zeros(0, np.int64), np.zeros((0, 3), np.uint32)
-    cells = np.floor(vertices / np.float32(CASTER_CELL_M)).astype(np.int64)
+    cells = np.floor(vertices / cells_m[:, None]).astype(np.int64)
     keys = np.column_stack([groups, cells])
     _, first, cluster = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     coarse = cluster.reshape(-1)[faces.astype(np.int64)]
@@ -157,5 +158,5 @@ class ShadowMaps:
             )
 
         if top < bottom:
-            self._in_bands(draw, self._size)
+            self._in_bands(draw, 0, self._size)
         return top, bottom, left, right

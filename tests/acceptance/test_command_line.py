@@ -1,14 +1,13 @@
 """The command line as its users meet it: results, contracts, and what bad input gets."""
 
 import csv
-import json
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-from dotmask.tum import read_sequence, read_trajectory
+from dotmask.tum import read_trajectory
 from scenarios.registry import SCENARIOS
 from scenarios.report import Report
 from scenarios.spec import scenario_from_json
@@ -98,20 +97,6 @@ def test_expectations_decide_the_exit_code(tmp_path: Path, dotmask) -> None:
     assert (holds.code, missed.code) == (0, 1)
     assert "MISSED dotmask.ate_rmse_m<1e-9" in missed.err
     assert (tmp_path / "b" / "report.json").exists(), "a missed threshold is a result too"
-
-
-def test_render_writes_a_tum_folder_with_its_truth(tmp_path: Path, dotmask) -> None:
-    out = tmp_path / "sequence"
-    done = dotmask("render", "smoke", "--frames", 4, "--out", out)
-    assert done.code == 0, done.err
-    frames = list(read_sequence(out))
-    assert len(frames) == 4
-    assert frames[0].rgb.shape == (240, 320, 3)
-    assert len(read_trajectory(out / "groundtruth.txt")) == 4
-    actors = json.loads((out / "objects.json").read_text())
-    for actor in actors:
-        assert len(read_trajectory(out / "objects" / f"{actor['name']}.txt")) == 4
-    assert len(list((out / "masks").iterdir())) == 4
 
 
 BAD_INPUT = [

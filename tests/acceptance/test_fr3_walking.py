@@ -9,7 +9,7 @@ import pytest
 from scenarios.registry import scenario
 from scenarios.report import Report
 from scenarios.run import RunSettings, run
-from scenarios.spec import CameraSpec, PeopleSpec, PersonSpec, Scenario, with_overrides
+from scenarios.spec import CameraSpec, PeopleSpec, PersonSpec, Scenario, WalkLoopAct
 
 pytestmark = pytest.mark.acceptance
 
@@ -17,15 +17,14 @@ pytestmark = pytest.mark.acceptance
 @pytest.fixture(scope="module")
 def walking_xyz(tmp_path_factory: pytest.TempPathFactory) -> Report:
     out = tmp_path_factory.mktemp("runs") / "xyz"
-    first_half = with_overrides(scenario("fr3_walking_xyz"), {"frames": "450"})
-    return run(first_half, RunSettings.parse(), out, lambda: None)
+    return run(scenario("fr3_walking_xyz"), RunSettings.parse(methods="unmasked,dotmask"), out, lambda: None)
 
 
 def test_masking_saves_odometry(walking_xyz: Report) -> None:
     methods = walking_xyz.methods
     assert methods["dotmask"].ate_rmse_m < 0.02
     assert methods["unmasked"].ate_rmse_m > 5 * methods["dotmask"].ate_rmse_m
-    assert methods["dotmask"].tracked_frames == 450
+    assert methods["dotmask"].tracked_frames == 864
 
 
 def test_the_classification_finds_what_moves(walking_xyz: Report) -> None:
@@ -45,9 +44,8 @@ def test_the_speed_of_a_walking_person_is_known_after_a_second(tmp_path: Path) -
         name="walker",
         character="man",
         outfit="plaid",
-        speed_m_s=1.2,
-        start_m=1.3,
-        waypoints_m=((-2.9, 0.75), (2.6, 0.75), (2.6, -0.2), (-2.9, -0.2)),
+        position_m=(-2.9, 0.75),
+        acts=(WalkLoopAct(waypoints_m=((2.6, 0.75), (2.6, -0.2), (-2.9, -0.2)), speed_m_s=1.2, start_m=1.3),),
     )
     stage = Scenario(
         name="one_walker",

@@ -1,10 +1,11 @@
-"""What the golden files hold: statistics of one frame, and the figures of a fixed trajectory.
+"""What the golden files hold: a hash of one frame of every scenario, statistics of one frame, figures of a trajectory.
 
     python tests/golden/regenerate.py
 
 writes them anew. Look at the difference before you commit it.
 """
 
+import hashlib
 import json
 from pathlib import Path
 
@@ -12,7 +13,8 @@ import numpy as np
 
 from dotmask.evaluation.trajectory import absolute_trajectory_error, relative_pose_error
 from dotmask.records import Trajectory
-from scenarios.registry import scenario
+from scenarios.registry import SCENARIOS, scenario
+from scenarios.spec import with_overrides
 from scenarios.world import build_simulator
 
 FRAME = 30
@@ -30,6 +32,21 @@ def frame_statistics() -> dict[str, object]:
     }
 
 
+def frame_hash(name: str) -> str:
+    """sha256 over the sensor's bytes of the middle frame of a scenario, at a quarter of the width and height."""
+    camera = scenario(name).camera
+    smaller = {f"camera.{key}": getattr(camera, key) // 4 for key in ("width", "height")}
+    smaller |= {f"camera.{key}": getattr(camera, key) / 4 for key in ("fx", "fy", "cx", "cy")}
+    simulator = build_simulator(with_overrides(scenario(name), {k: str(v) for k, v in smaller.items()}), "numba", 1)
+    frame = simulator.frame(len(simulator) // 2)
+    return hashlib.sha256(frame.rgb.tobytes() + frame.depth_m.tobytes()).hexdigest()
+
+
+def frame_hashes() -> dict[str, str]:
+    """Of all scenarios, by name."""
+    return {name: frame_hash(name) for name in sorted(SCENARIOS)}
+
+
 def trajectory_figures() -> dict[str, float]:
     """ATE and RPE of a fixed noisy spiral: no random numbers, so that they cannot change with a generator."""
     t = np.arange(200) / 30.0
@@ -45,8 +62,13 @@ def trajectory_figures() -> dict[str, float]:
 
 
 def main() -> None:
-    """Write both files."""
-    for name, values in (("smoke_frame", frame_statistics()), ("trajectory", trajectory_figures())):
+    """Write the files."""
+    files = {
+        "frame_hashes": frame_hashes(),
+        "smoke_frame": frame_statistics(),
+        "trajectory": trajectory_figures(),
+    }
+    for name, values in files.items():
         (Path(__file__).parent / f"{name}.json").write_text(json.dumps(values, indent=2) + "\n")
         print(f"{name}.json")
 

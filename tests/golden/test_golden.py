@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from scenarios.registry import SCENARIOS
+
 HERE = Path(__file__).parent
 _spec = importlib.util.spec_from_file_location("regenerate", HERE / "regenerate.py")
 regenerate = importlib.util.module_from_spec(_spec)
@@ -17,6 +19,15 @@ _spec.loader.exec_module(regenerate)
 
 def stored(name: str) -> dict:
     return json.loads((HERE / f"{name}.json").read_text())
+
+
+def test_every_scenario_has_a_stored_frame() -> None:
+    assert sorted(stored("frame_hashes")) == sorted(SCENARIOS)
+
+
+@pytest.mark.parametrize("name", sorted(SCENARIOS))
+def test_a_frame_has_the_bytes_it_had(name: str) -> None:
+    assert regenerate.frame_hash(name) == stored("frame_hashes")[name]
 
 
 def test_a_frame_looks_as_it_did() -> None:

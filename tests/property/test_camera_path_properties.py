@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation, Slerp
 
-from sim.camera_path import HalfspherePath, RecordedPath, Recording, RpyPath, StaticPath, XyzPath
+from sim.camera_paths.hand_held import HalfspherePath, RpyPath, StaticPath, XyzPath
+from sim.camera_paths.recorded import RecordedPath, Recording
 from sim.geometry import look_at
 from sim.quaternions import rotation_from_quaternion, slerp
 

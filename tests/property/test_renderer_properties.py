@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim.records import CameraModel
+from sim.records import CameraModel, Moment
 from sim.renderers.visibility_buffer import VisibilityBufferRenderer
 from sim.scene import Placed, Scene, SceneObject, Surface
 
@@ -36,7 +36,7 @@ def actor(number: int, surface: Surface) -> SceneObject:
 
 def render(objects: list[SceneObject]) -> tuple[np.ndarray, np.ndarray, list[int]]:
     renderer = VisibilityBufferRenderer(Scene(objects=tuple(objects), lights=()), CAMERA)
-    images = renderer.render(np.eye(4), {o.name: np.eye(4)[None] for o in objects})
+    images = renderer.render(Moment(T_world_camera=np.eye(4), palettes={o.name: np.eye(4)[None] for o in objects}))
     return images.instance_ids, images.depth_m, [renderer.unoccluded_pixels(o.name) for o in objects]
 
 

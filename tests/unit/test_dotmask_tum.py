@@ -7,7 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from dotmask.atomic_file import write_atomically
-from dotmask.errors import DotmaskError, SequenceFolderError, TrajectoryFileError
+from dotmask.errors import SequenceFolderError, TrajectoryFileError
+from dotmask.partial_folder import GrowingFiles, PartialFolder
 from dotmask.records import Intrinsics, RgbdFrame, Trajectory
 from dotmask.timestamps import nearest_pairs
 from dotmask.tum import (
@@ -46,9 +47,12 @@ def write_example(folder: Path, count: int = 3) -> list[RgbdFrame]:
     rng = np.random.default_rng(0)
     frames = [frame(k, rng) for k in range(count)]
     poses = random_trajectory(1, count).T_world_camera
-    with TumSequenceWriter(folder, CAMERA) as writer:
-        for one, pose in zip(frames, poses, strict=True):
-            writer.write(one, pose)
+    growing = PartialFolder.create(folder, {})
+    writer = TumSequenceWriter(growing.files, CAMERA)
+    writer.begin()
+    for one, pose in zip(frames, poses, strict=True):
+        writer.write(one, pose)
+    growing.finish()
     return frames
 
 
@@ -148,10 +152,10 @@ def test_sequence_files_are_those_of_the_benchmark(tmp_path):
     root = tmp_path / "seq"
     assert sorted(p.relative_to(root).as_posix() for p in root.rglob("*") if p.is_file()) == [
         "associations.txt",
+        "camera.json",
         "depth.txt",
         "depth/1000.000000.png",
         "groundtruth.txt",
-        "intrinsics.json",
         "rgb.txt",
         "rgb/1000.000000.png",
     ]
@@ -169,46 +173,28 @@ def test_depth_beyond_sixteen_bits_is_no_return(tmp_path):
     depth = np.full((6, 8), 13.2, np.float32)
     depth[0, 0] = MAX_DEPTH_M - 0.001
     far = RgbdFrame(index=0, timestamp_s=0.0, rgb=np.zeros((6, 8, 3), np.uint8), depth_m=depth, intrinsics=CAMERA)
-    with TumSequenceWriter(tmp_path / "seq", CAMERA) as writer:
-        writer.write(far)
+    folder = PartialFolder.create(tmp_path / "seq", {})
+    writer = TumSequenceWriter(folder.files, CAMERA)
+    writer.begin()
+    writer.write(far)
+    folder.finish()
     (back,) = read_sequence(tmp_path / "seq")
     assert back.depth_m[0, 0] == pytest.approx(13.106, abs=1e-4)
     assert np.count_nonzero(back.depth_m) == 1
-    assert not (tmp_path / "seq" / "groundtruth.txt").exists()
-
-
-def test_interrupted_writer_leaves_nothing(tmp_path):
-    def interrupted() -> None:
-        with TumSequenceWriter(tmp_path / "seq", CAMERA) as writer:
-            writer.write(frame(0, np.random.default_rng(0)))
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        interrupted()
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_writer_refuses_a_folder_with_content_and_takes_an_empty_one(tmp_path):
-    (tmp_path / "empty").mkdir()
-    write_example(tmp_path / "empty")
-    with (
-        pytest.raises(DotmaskError, match="is not an empty folder"),
-        TumSequenceWriter(tmp_path / "empty", CAMERA),
-    ):
-        pass
-    assert len(list(read_sequence(tmp_path / "empty"))) == 3
+    assert len(read_trajectory(tmp_path / "seq" / "groundtruth.txt")) == 0
 
 
 def test_writer_refuses_frames_that_do_not_fit(tmp_path):
     rng = np.random.default_rng(0)
-    with TumSequenceWriter(tmp_path / "seq", CAMERA) as writer:
+    writer = TumSequenceWriter(GrowingFiles(tmp_path), CAMERA)
+    writer.write(frame(1, rng))
+    with pytest.raises(ValueError, match="not later"):
         writer.write(frame(1, rng))
-        with pytest.raises(ValueError, match="not later"):
-            writer.write(frame(1, rng))
-        with pytest.raises(ValueError, match="not finite"):
-            writer.write(frame(2, rng), np.full((4, 4), np.nan))
-    with pytest.raises(SequenceFolderError, match="inside the with block"):
-        writer.write(frame(2, rng))
+    with pytest.raises(ValueError, match="not finite"):
+        writer.write(frame(2, rng), np.full((4, 4), np.nan))
+    other = Intrinsics(width=8, height=6, fx=1.0, fy=1.0, cx=0.0, cy=0.0)
+    with pytest.raises(ValueError, match="intrinsics are not those"):
+        TumSequenceWriter(GrowingFiles(tmp_path), other).write(frame(2, rng))
 
 
 def test_reader_pairs_the_nearest_stamps(tmp_path):
@@ -224,7 +210,7 @@ def test_reader_pairs_the_nearest_stamps(tmp_path):
 def test_reader_takes_intrinsics_where_the_folder_has_none(tmp_path):
     write_example(tmp_path / "seq")
     assert read_intrinsics(tmp_path / "seq") == CAMERA
-    (tmp_path / "seq" / "intrinsics.json").unlink()
+    (tmp_path / "seq" / "camera.json").unlink()
     with pytest.raises(SequenceFolderError, match="give the intrinsics"):
         read_sequence(tmp_path / "seq")
     other = Intrinsics(width=8, height=6, fx=1.0, fy=1.0, cx=0.0, cy=0.0)
@@ -245,8 +231,8 @@ def test_reader_takes_intrinsics_where_the_folder_has_none(tmp_path):
         (lambda root: (root / "depth/1000.000000.png").write_bytes(b"no"), "is not an image"),
         (lambda root: cv2.imwrite(str(root / "depth/1000.000000.png"), np.zeros((6, 8), np.uint8)), "16 bits"),
         (lambda root: cv2.imwrite(str(root / "rgb/1000.000000.png"), np.zeros((6, 8), np.uint8)), "8 bits"),
-        (lambda root: (root / "intrinsics.json").write_text("[]"), "intrinsics.json: cannot be read"),
-        (lambda root: (root / "intrinsics.json").write_text("{}"), "intrinsics.json: cannot be read"),
+        (lambda root: (root / "camera.json").write_text("[]"), "camera.json: cannot be read"),
+        (lambda root: (root / "camera.json").write_text("{}"), "camera.json: cannot be read"),
     ],
 )
 def test_broken_sequence_is_named(tmp_path, change, message):
@@ -258,7 +244,7 @@ def test_broken_sequence_is_named(tmp_path, change, message):
 
 def test_other_depth_scale_is_refused(tmp_path):
     write_example(tmp_path / "seq")
-    path = tmp_path / "seq" / "intrinsics.json"
+    path = tmp_path / "seq" / "camera.json"
     path.write_text(json.dumps({**json.loads(path.read_text()), "depth_per_metre": 1000}))
     with pytest.raises(SequenceFolderError, match="depth_per_metre is 1000"):
         read_sequence(tmp_path / "seq")

@@ -4,15 +4,17 @@ import pytest
 
 from scenarios.errors import ScenarioError
 from scenarios.registry import SCENARIOS, scenario
-from scenarios.spec import PersonSpec, Scenario, scenario_from_json, with_overrides
+from scenarios.spec import PersonSpec, Scenario, StandAct, WalkLoopAct, scenario_from_json, with_overrides
 
 
 def test_an_override_reaches_a_nested_value_and_leaves_the_original() -> None:
     smoke = scenario("smoke")
-    varied = with_overrides(smoke, {"camera.speed": "2", "people.cast.1.speed_m_s": "1.5", "frames": "7"})
-    assert (varied.camera.speed, varied.people.cast[1].speed_m_s, varied.frames) == (2.0, 1.5, 7)
+    varied = with_overrides(smoke, {"camera.speed": "2", "people.cast.1.acts.0.speed_m_s": "1.5", "frames": "7"})
+    assert (varied.camera.speed, varied.people.cast[1].acts[0].speed_m_s, varied.frames) == (2.0, 1.5, 7)
     assert smoke.camera.speed == 1.0
-    assert with_overrides(varied, {"camera.speed": "1", "people.cast.1.speed_m_s": "1.0", "frames": "60"}) == smoke
+    assert (
+        with_overrides(varied, {"camera.speed": "1", "people.cast.1.acts.0.speed_m_s": "1.0", "frames": "60"}) == smoke
+    )
 
 
 @pytest.mark.parametrize(
@@ -26,7 +28,7 @@ def test_an_override_reaches_a_nested_value_and_leaves_the_original() -> None:
         ("camera.speed", "NaN", r"camera.speed: .*finite"),
         ("frames", "0", r"frames: .*greater than or equal to 1"),
         ("frames", "2.5", r"frames: .*valid integer"),
-        ("camera.path", "zigzag", r"camera.path: .*'static', 'xyz', 'rpy' or 'halfsphere'"),
+        ("camera.path", "zigzag", r"camera.path: .*'static', 'xyz', 'rpy', 'halfsphere'"),
     ],
 )
 def test_a_bad_override_names_the_field_and_what_is_valid(key: str, value: str, message: str) -> None:
@@ -39,15 +41,42 @@ def test_an_unknown_scenario_names_near_matches() -> None:
         scenario("fr3_walk_xyz")
 
 
-def test_a_walker_needs_two_waypoints() -> None:
-    with pytest.raises(ValueError, match="at least 2 waypoint"):
-        PersonSpec(name="a", character="man", outfit="plaid", waypoints_m=((0, 0),))
+def test_a_person_needs_an_act_and_a_loop_is_the_last_one() -> None:
+    base = {"name": "a", "character": "man", "outfit": "plaid"}
+    with pytest.raises(ValueError, match="at least 1 item"):
+        PersonSpec.model_validate({**base, "acts": ()})
+    loop, stand = WalkLoopAct(waypoints_m=((1.0, 0.0),)), StandAct(duration_s=1.0)
+    with pytest.raises(ValueError, match="only act of a person"):
+        PersonSpec.model_validate({**base, "acts": (loop, stand)})
+
+
+def edited(**changes: object) -> str:
+    """The JSON of `smoke` with one person and one thing changed."""
+    tree = json.loads(scenario("smoke").to_json())
+    for key, value in changes.items():
+        tree["things"][1][key] = value
+    return json.dumps(tree)
 
 
 def test_two_actors_with_one_name_are_refused() -> None:
-    tree = json.loads(scenario("smoke").to_json())
-    tree["chairs"][1]["name"] = tree["chairs"][0]["name"]
     with pytest.raises(ScenarioError, match="two actors have the same name"):
+        scenario_from_json(edited(name="chair_left"), "x.json")
+    with pytest.raises(ScenarioError, match="two actors have the same name"):
+        scenario_from_json(edited(name="anton"), "x.json")
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"seated_on": "sofa"}, "anton uses 'sofa', but no chair has that name"),
+        ({"acts": ({"kind": "push", "chair": "berta", "distance_m": 1.0},)}, "anton uses 'berta', but no chair"),
+        ({"carries": "chair_left"}, "anton carries 'chair_left', but no cup or box has that name"),
+    ],
+)
+def test_what_a_person_uses_must_be_there_and_of_the_right_kind(changes: dict[str, object], message: str) -> None:
+    tree = json.loads(scenario("smoke").to_json())
+    tree["people"]["cast"][0].update(changes)
+    with pytest.raises(ScenarioError, match=message):
         scenario_from_json(json.dumps(tree), "x.json")
 
 

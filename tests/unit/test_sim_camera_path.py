@@ -3,16 +3,8 @@
 import numpy as np
 import pytest
 
-from sim.camera_path import (
-    HALFSPHERE_RADIUS_M,
-    HalfspherePath,
-    RecordedPath,
-    Recording,
-    RpyPath,
-    StaticPath,
-    XyzPath,
-    read_recorded,
-)
+from sim.camera_paths.hand_held import HALFSPHERE_RADIUS_M, HalfspherePath, RpyPath, StaticPath, XyzPath
+from sim.camera_paths.recorded import RecordedPath, Recording, read_recorded
 from sim.errors import CameraPathError
 from sim.geometry import look_at, pose, rotation_z
 

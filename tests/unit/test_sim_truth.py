@@ -8,7 +8,7 @@ import numpy.typing as npt
 import pytest
 
 from sim.geometry import FloatArray, look_at, pose, rotation_z
-from sim.records import CameraModel, ObjectTruth, RenderedImages
+from sim.records import CameraModel, Moment, ObjectTruth, RenderedImages
 from sim.renderers.visibility_buffer import VisibilityBufferRenderer
 from sim.scene import Scene, SceneObject, Surface
 from sim.truth import SurfaceMoments, object_truth
@@ -188,7 +188,7 @@ def seen(T_object: FloatArray, wall_z: float | None = None) -> ObjectTruth:
     eye = look_at((0.5, -1.0, 1.2), (0.0, 3.0, 1.0))  # everything is moved along with the camera
     palettes = {name: eye @ palette for name, palette in palettes.items()}
     renderer = VisibilityBufferRenderer(Scene(objects=tuple(objects), lights=()), CAMERA)
-    images = renderer.render(eye, palettes)
+    images = renderer.render(Moment(T_world_camera=eye, palettes=palettes))
     moments = SurfaceMoments.of(obj)
     return object_truth(
         obj, moments, 0.0, palettes["actor9"], images, CAMERA, eye, renderer.unoccluded_pixels("actor9")

@@ -1,0 +1,1 @@
+"""Sequences as folders: the formats of `dotmask render`, each written frame by frame."""

@@ -1,0 +1,1 @@
+"""Where the camera is over time. Every path is a pure function of time."""

@@ -1,0 +1,1 @@
+"""People: baked characters, their skeletons, and how they move."""

@@ -1,0 +1,1 @@
+"""How things move: rigid bodies, simulated once with Bullet and then replayed from keyframes."""

@@ -1,0 +1,5 @@
+#version 400 core
+
+void main()
+{
+}

@@ -1,0 +1,1 @@
+"""Rooms: a shell, furniture, lights, and what blocks the way."""

@@ -1,0 +1,1 @@
+"""Things made by code from parameters and a seed: meshes, textures, furniture."""

@@ -1,0 +1,76 @@
+"""Run scenarios with `unmasked` and `dotmask`, and write the table of the README.
+
+Examples::
+
+    python -m tools.result_table                       # the scenarios of the paper, whole
+    python -m tools.result_table --frames 300 crowd    # others, shorter; prints without writing
+"""
+
+import argparse
+import tempfile
+from pathlib import Path
+
+from rich.progress import track
+
+from scenarios.registry import SCENARIOS, scenario
+from scenarios.report import Report
+from scenarios.run import RunSettings, run
+from scenarios.spec import with_overrides
+from tools.doc_block import markdown_table, write_block
+
+PAGE = Path(__file__).parent.parent / "README.md"
+HEADER = [
+    "scenario",
+    "frames",
+    "ATE unmasked, mm",
+    "ATE dotmask, mm",
+    "MOC precision",
+    "MOC recall",
+    "leak, %",
+    "waste, %",
+]
+
+
+def figure(value: float | None, scale: float, digits: int) -> str:
+    """A number as the table shows it; "-" when it was not measured."""
+    return "-" if value is None else f"{scale * value:.{digits}f}"
+
+
+def row(report: Report) -> list[str]:
+    """One line of the table."""
+    ours = report.methods["dotmask"]
+    return [
+        f"`{report.scenario}`",
+        str(report.frames),
+        figure(report.methods["unmasked"].ate_rmse_m, 1e3, 1),
+        figure(ours.ate_rmse_m, 1e3, 1),
+        figure(ours.moc.precision, 1, 3),
+        figure(ours.moc.recall, 1, 3),
+        figure(ours.masks.leak, 1e2, 1),
+        figure(ours.masks.waste, 1e2, 1),
+    ]
+
+
+def main() -> None:
+    """Run and print; without names, write into the README as well."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("names", nargs="*", help="scenarios; default: those tagged 'paper'")
+    parser.add_argument("--frames", type=int, help="only the first frames of each")
+    options = parser.parse_args()
+    names = options.names or [s.name for s in SCENARIOS.values() if "paper" in s.tags]
+    settings = RunSettings.parse(methods="unmasked,dotmask")
+    rows = []
+    for name in track(names, "scenarios"):
+        chosen = scenario(name)
+        if options.frames is not None:
+            chosen = with_overrides(chosen, {"frames": str(min(options.frames, chosen.frames))})
+        with tempfile.TemporaryDirectory() as folder:
+            rows.append(row(run(chosen, settings, Path(folder) / "run", lambda: None)))
+    table = markdown_table(HEADER, rows)
+    print(table)
+    if not options.names and options.frames is None:
+        write_block(PAGE, "results", "python -m tools.result_table", table)
+
+
+if __name__ == "__main__":
+    main()
