@@ -2,7 +2,7 @@
 
 Examples::
 
-    python -m tools.result_table                       # the scenarios of the paper, whole
+    python -m tools.result_table                       # the walking scenarios, whole
     python -m tools.result_table --frames 300 crowd    # others, shorter; prints without writing
 """
 
@@ -54,10 +54,10 @@ def row(report: Report) -> list[str]:
 def main() -> None:
     """Run and print; without names, write into the README as well."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("names", nargs="*", help="scenarios; default: those tagged 'paper'")
+    parser.add_argument("names", nargs="*", help="scenarios; default: those tagged 'walking'")
     parser.add_argument("--frames", type=int, help="only the first frames of each")
     options = parser.parse_args()
-    names = options.names or [s.name for s in SCENARIOS.values() if "paper" in s.tags]
+    names = options.names or [s.name for s in SCENARIOS.values() if "walking" in s.tags]
     settings = RunSettings.parse(methods="unmasked,dotmask")
     rows = []
     for name in track(names, "scenarios"):

@@ -69,7 +69,7 @@ CORRIDOR_CHAIRS = (
         look="black",
         position_m=(1.1, 8.9, 0.0),
         heading_deg=200,
-        impulses=(ImpulseSpec(time_s=15.0, impulse_n_s=(-6.0, 0.5, 0.0), offset_m=0.06),),
+        impulses=(ImpulseSpec(time_s=15.01, impulse_n_s=(-6.0, 0.5, 0.0), offset_m=0.06),),
     ),
     ThingSpec(name="chair_c", kind="chair", look="red", position_m=(-1.15, 2.0, 0.0), heading_deg=30),
 )

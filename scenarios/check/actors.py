@@ -9,6 +9,9 @@ from sim.scene import SceneObject
 INSIDE_PX = 1
 """A visible keypoint's pixel or one so near shows the person."""
 
+KEYPOINT_NEAR_M = 0.05
+"""As near as the renderers draw."""
+
 
 def static_flow_error(sample: Sample) -> Measured:
     """Scene flow of what cannot move: metres."""
@@ -88,15 +91,21 @@ def collisions(sample: Sample) -> Measured:
 
 
 def keypoint_pixel_error(sample: Sample) -> Measured:
-    """Stated pixels of the keypoints against the projections of the points: pixels."""
+    """Stated pixels of the keypoints against the projections of the points: pixels.
+
+    Of points nearer to the camera's plane than KEYPOINT_NEAR_M nothing is compared: there a pose's last bit moves the
+    projection by many pixels, and nothing is drawn.
+    """
     errors: list[float] = []
     for actor in sample.now.objects:
         if actor.keypoints is None:
             continue
-        pixels = pixels_of(camera_points(actor.keypoints.world_m, sample.now), sample.camera)
+        points = camera_points(actor.keypoints.world_m, sample.now)
+        pixels = pixels_of(points, sample.camera)
         error = np.linalg.norm(pixels - actor.keypoints.pixels, axis=1)
         both_behind = np.isnan(pixels).any(axis=1) & np.isnan(actor.keypoints.pixels).any(axis=1)
-        errors += np.where(both_behind, 0.0, np.where(np.isnan(error), np.inf, error)).tolist()
+        error = np.where(both_behind, 0.0, np.where(np.isnan(error), np.inf, error))
+        errors += error[np.abs(points[:, 2]) > KEYPOINT_NEAR_M].tolist()
     return Measured.of(errors, len(errors))
 
 
