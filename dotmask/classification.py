@@ -5,6 +5,7 @@ masks overlap too little. It prints "above" for the overlap as well: a misprint,
 overlap.
 """
 
+from collections.abc import Callable
 from functools import cache
 
 import cv2
@@ -13,6 +14,9 @@ from scipy.special import gammaincinv
 
 from dotmask.profiles import MaskAlignment, Profile
 from dotmask.records import MaskImage, Reason, Track, Verdict
+
+Classify = Callable[[Track, Track | None, Profile], Verdict]
+"""The form of `classify`."""
 
 
 def classify(track: Track, previous: Track | None, profile: Profile) -> Verdict:

@@ -17,12 +17,13 @@ from typing import Protocol
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from dotmask.classification import classify
+from dotmask.classification import Classify, classify
 from dotmask.interfaces import Segmenter, SlamBackend
 from dotmask.masking import mask_depth
 from dotmask.profiles import PoseFeedback, Profile
 from dotmask.records import Detections, FloatArray, MaskedDepth, Observation, PoseEstimate, RgbdFrame, Track
 from dotmask.segmentation.selection import select_detections
+from dotmask.tracking.association import Associate, associate
 from dotmask.tracking.measurement import observe
 from dotmask.tracking.tracker import TrackerState, track_objects
 
@@ -124,10 +125,26 @@ class _Kept:
 
 
 class DotMask:
-    """The method of the paper. The one object with state; a step that raises leaves the state as it was."""
+    """The method of the paper. The one object with state; a step that raises leaves the state as it was.
 
-    def __init__(self, segmenter: Segmenter, profile: Profile) -> None:
+    Args:
+        segmenter: finds the objects.
+        profile: parameters.
+        associate: pairs tracks and observations. This stage and the next can be replaced, to learn what they are
+            to blame for.
+        classify: says which tracks move.
+    """
+
+    def __init__(
+        self,
+        segmenter: Segmenter,
+        profile: Profile,
+        *,
+        associate: Associate = associate,
+        classify: Classify = classify,
+    ) -> None:
         self._segmenter, self._profile = segmenter, profile
+        self._associate, self._classify_track = associate, classify
         self._state = TrackerState()
         self._kept: _Kept | None = None
 
@@ -189,11 +206,15 @@ class DotMask:
         observations: tuple[Observation, ...],
         T_world_camera: FloatArray,
     ) -> TrackerState:
-        return track_objects(before, observations, detections, frame.timestamp_s, T_world_camera, self._profile)
+        return track_objects(
+            before, observations, detections, frame.timestamp_s, T_world_camera, self._profile, self._associate
+        )
 
     def _classify(self, before: TrackerState, after: TrackerState) -> TrackerState:
         known = {t.track_id: t for t in before.tracks}
-        tracks = tuple(replace(t, verdict=classify(t, known.get(t.track_id), self._profile)) for t in after.tracks)
+        tracks = tuple(
+            replace(t, verdict=self._classify_track(t, known.get(t.track_id), self._profile)) for t in after.tracks
+        )
         return replace(after, tracks=tracks)
 
 

@@ -17,6 +17,7 @@ from dotmask.records import FloatArray
 PoseFeedback = Literal["previous", "constant_velocity", "refined"]
 UnknownPolicy = Literal["mask", "keep"]
 MaskAlignment = Literal["none", "box"]
+Measurement = Literal["bbox_centre", "mask_centroid", "pixel_depth"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,6 +102,7 @@ class Profile:
         score_threshold: detections below it are dropped (paper, Table I).
         max_observations: at most this many detections, the best first (paper, Table I: m).
         max_misses: a track ends when it was not observed for this many frames (paper, Table I: e).
+        measurement: what is measured of a detection (see dotmask.tracking.measurement.observe); paper: `bbox_centre`.
         noise: the model behind R.
         min_depth_pixels: fewer pixels with depth give no observation (not in the paper).
         depth_trim_m: pixels farther than this from the median depth of the mask are left out of the mean; None keeps
@@ -133,6 +135,7 @@ class Profile:
     score_threshold: float
     max_observations: int
     max_misses: int
+    measurement: Measurement
     noise: MeasurementNoise
     min_depth_pixels: int
     depth_trim_m: float | None
@@ -195,6 +198,7 @@ PAPER = Profile(
     score_threshold=0.1,
     max_observations=5,
     max_misses=10,
+    measurement="bbox_centre",
     noise=MeasurementNoise(pixel_sigma_px=4.0, depth_sigma_m=0.02, depth_sigma_per_m=0.0019, is_diagonal=True),
     min_depth_pixels=1,
     depth_trim_m=None,
@@ -266,6 +270,7 @@ CALIBRATED = Profile(
     score_threshold=0.3,
     max_observations=10,
     max_misses=30,
+    measurement="bbox_centre",
     noise=MeasurementNoise(
         pixel_sigma_px=1.0,
         depth_sigma_m=0.0012,

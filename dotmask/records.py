@@ -9,7 +9,7 @@ Arrays are kept as read-only views: no copy is made, and the caller's own array 
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -145,15 +145,28 @@ class Detections:
         )
 
 
+class MeasurementModel(Protocol):
+    """What is measured of a point in the camera frame (metres): h without the camera's pose."""
+
+    def measured(self, points_camera: FloatArray) -> FloatArray:
+        """`h`: (..., 3) what is measured of points (..., 3)."""
+        ...
+
+    def jacobian(self, points_camera: FloatArray) -> FloatArray:
+        """`dh/dp` (..., 3, 3) at points (..., 3)."""
+        ...
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Observation:
     """Position of one detected object as measured in the camera frame.
 
     Attributes:
-        position_camera: (3,) z of the paper, metres, camera frame.
-        covariance: (3, 3) R of the paper, square metres, camera frame.
+        position_camera: (3,) where the object is seen, metres, camera frame.
+        covariance: (3, 3) R of the paper, of what `model` says is measured, in the units of that.
         class_name: COCO class name.
         detection_index: which of the frame's detections this is.
+        model: what is measured; `model.measured(position_camera)` is z of the paper.
         is_partial: whether something nearer, or the image border, hides a side of it.
     """
 
@@ -161,6 +174,7 @@ class Observation:
     covariance: FloatArray
     class_name: str
     detection_index: int
+    model: MeasurementModel
     is_partial: bool = False
 
     def __post_init__(self) -> None:

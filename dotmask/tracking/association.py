@@ -1,6 +1,6 @@
 """Which observation belongs to which track. The paper does not say; this is gated global nearest neighbour."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -31,6 +31,10 @@ class Association:
     unmatched_observations: tuple[int, ...]
 
 
+Associate = Callable[[Sequence[Track], Sequence[Observation], FloatArray, Profile], Association]
+"""The form of `associate`."""
+
+
 @cache
 def chi_square_quantile(probability: float, degrees: int) -> float:
     """The value that a chi-square variable stays below with `probability`."""
@@ -40,13 +44,16 @@ def chi_square_quantile(probability: float, degrees: int) -> float:
 def squared_mahalanobis(
     tracks: Sequence[Track], observations: Sequence[Observation], T_world_camera: FloatArray
 ) -> FloatArray:
-    """(T, O) `yᵀ S⁻¹ y` of every pair, for tracks predicted to the frame of the observations."""
+    """(T, O) `yᵀ S⁻¹ y` of every pair, for tracks predicted to the frame of the observations, all of one model."""
     T_camera_world = inverse(T_world_camera)
     R_camera_world = T_camera_world[:3, :3]
     expected = transform(T_camera_world, np.array([t.position_world for t in tracks]))
     P = R_camera_world @ np.array([t.covariance[:3, :3] for t in tracks]) @ R_camera_world.T
-    y = np.array([o.position_camera for o in observations])[None] - expected[:, None]
-    S = P[:, None] + np.array([o.covariance for o in observations])[None]
+    model = observations[0].model  # one frame's observations are made alike
+    J = model.jacobian(expected)
+    z = model.measured(np.array([o.position_camera for o in observations]))
+    y = z[None] - model.measured(expected)[:, None]
+    S = (J @ P @ J.swapaxes(1, 2))[:, None] + np.array([o.covariance for o in observations])[None]
     return np.asarray((y * np.linalg.solve(S, y[..., None])[..., 0]).sum(-1))
 
 

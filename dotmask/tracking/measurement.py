@@ -1,4 +1,4 @@
-"""From detections and depth to positions in the camera frame: z and R of the paper (Tracking Using EKF, Update)."""
+"""From detections and depth to positions in the camera frame: z of the paper (Tracking Using EKF, Update)."""
 
 from typing import NamedTuple
 
@@ -6,8 +6,11 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from dotmask.profiles import ClassModel, MeasurementNoise, Profile
+from dotmask.geometry import back_project
+from dotmask.profiles import ClassModel, Profile
 from dotmask.records import DepthImage, Detections, FloatArray, Intrinsics, MaskImage, Observation, RgbdFrame
+from dotmask.tracking.measurement_model import CAMERA_POINT, PixelDepth
+from dotmask.tracking.measurement_noise import measurement_covariance
 
 _BAND_PX = 8
 """How far outside a box an occluder is looked for: past the ring without depth that sensors leave at depth edges."""
@@ -39,80 +42,48 @@ class _Crop(NamedTuple):
 def observe(detections: Detections, frame: RgbdFrame, profile: Profile) -> tuple[Observation, ...]:
     """Camera-frame positions of the detections of `frame`.
 
-    `z_z` is the mean depth of the mask's pixels with depth, `z_x = (u - cx) z_z / fx` and `z_y` alike, with (u, v) the
-    centre of the bounding box (paper). R follows from the sensor's noise and, where the profile says so, from how the
-    shape of the class changes and from sides of the object that are not seen. A detection with fewer than
-    `profile.min_depth_pixels` pixels of valid depth gives no observation.
+    `profile.measurement` says what is measured: `bbox_centre` is the paper's z: the mean depth `z_z` of the mask's
+    pixels with depth, `z_x = (u - cx) z_z / fx` and `z_y` alike, with (u, v) the centre of the bounding box.
+    `mask_centroid` takes the mean of the mask's pixels and their median depth instead. `pixel_depth` measures what the
+    box centre's pixel and the mean depth are before the back-projection. R follows from the sensor's noise and, where
+    the profile says so, from how the shape of the class changes and from sides of the object that are not seen. A
+    detection with fewer than `profile.min_depth_pixels` pixels of valid depth gives no observation.
     """
     observations = []
     labels = _label(detections, frame.intrinsics) if profile.noise.inflates_hidden_sides else None
+    model = PixelDepth(intrinsics=frame.intrinsics) if profile.measurement == "pixel_depth" else CAMERA_POINT
     for index, class_name in enumerate(detections.class_names):
         box = detections.boxes_px[index]
         crop = _crop(box, frame.intrinsics)
-        mask = detections.masks[index]
-        depth = _mean_depth(mask[crop.slices], frame.depth_m[crop.slices], profile)
+        mask, depth_m = detections.masks[index][crop.slices], frame.depth_m[crop.slices]
+        depth = _depth(mask, depth_m, profile)
         if depth is None:
             continue
-        model = profile.class_model(class_name)
+        centre = 0.5 * (box[:2] + box[2:])
+        if profile.measurement == "mask_centroid":
+            moments = cv2.moments(mask.view(np.uint8), binaryImage=True)
+            centre = np.array(
+                [crop.u_start + moments["m10"] / moments["m00"], crop.v_start + moments["m01"] / moments["m00"]]
+            )
+        p_camera = back_project(centre[None], np.array([depth]), frame.intrinsics)[0]
+        class_model = profile.class_model(class_name)
         missing = (0.0, 0.0)
         if labels is not None:
             view = _View(index + 1, labels, frame.depth_m, profile.noise.occluder_margin_m + 0.02 * depth**2)
-            missing = _missing_extent(view, box, crop, depth, model, frame.intrinsics)
+            missing = _missing_extent(view, box, crop, depth, class_model, frame.intrinsics)
         observations.append(
             Observation(
-                position_camera=_back_project_centre(box, depth, frame.intrinsics),
-                covariance=measurement_covariance(box, depth, missing, model, frame.intrinsics, profile.noise),
+                position_camera=p_camera,
+                covariance=measurement_covariance(
+                    p_camera, missing, model, class_model, frame.intrinsics, profile.noise
+                ),
                 class_name=class_name,
                 detection_index=index,
+                model=model,
                 is_partial=missing != (0.0, 0.0),
             )
         )
     return tuple(observations)
-
-
-def measurement_covariance(
-    box_px: FloatArray,
-    depth_m: float,
-    missing_m: tuple[float, float],
-    model: ClassModel,
-    intrinsics: Intrinsics,
-    noise: MeasurementNoise,
-) -> FloatArray:
-    """R (3, 3), square metres, camera frame.
-
-    Args:
-        box_px: `u_min, v_min, u_max, v_max`.
-        depth_m: measured depth.
-        missing_m: width and height of what a hidden side may hide; 0 where the object ends by itself.
-        model: how much the shape of the class changes, and its extent.
-        intrinsics: of the camera.
-        noise: see MeasurementNoise.
-    """
-    sigma_z = noise.depth_sigma_m + noise.depth_sigma_per_m * (depth_m - 0.4) ** 2
-    sigmas = np.array([noise.pixel_sigma_px, noise.pixel_sigma_px, sigma_z])
-    # Jacobian of the back-projection (u, v, z) -> (x, y, z).
-    J = np.diag([depth_m / intrinsics.fx, depth_m / intrinsics.fy, 1.0])
-    if not noise.is_diagonal:
-        J[:, 2] = _back_project_centre(box_px, 1.0, intrinsics)
-    scaled = J * sigmas
-    R: FloatArray = scaled @ scaled.T
-    # The centre of what is seen lies half of what is hidden away from the centre of the whole.
-    share = max((m / e for m, e in zip(missing_m, model.extent_m, strict=False) if e > 0), default=0.0)
-    offsets = (0.5 * missing_m[0], 0.5 * missing_m[1], noise.hidden_depth_share * share * model.extent_m[2])
-    hidden = [model.hidden_factor * offset for offset in offsets]
-    turned = noise.pose_rotation_sigma_rad * depth_m
-    for axis, sigma_turned in enumerate((turned, turned, 0.0)):
-        R[axis, axis] += (
-            model.shape_sigma_m[axis] ** 2 + hidden[axis] ** 2 + noise.pose_position_sigma_m**2 + sigma_turned**2
-        )
-    return R
-
-
-def _back_project_centre(box_px: FloatArray, depth_m: float, intrinsics: Intrinsics) -> FloatArray:
-    u, v = 0.5 * (box_px[0] + box_px[2]), 0.5 * (box_px[1] + box_px[3])
-    x = (u - intrinsics.cx) * depth_m / intrinsics.fx
-    y = (v - intrinsics.cy) * depth_m / intrinsics.fy
-    return np.array([x, y, depth_m])
 
 
 def _crop(box_px: FloatArray, intrinsics: Intrinsics) -> _Crop:
@@ -125,21 +96,26 @@ def _crop(box_px: FloatArray, intrinsics: Intrinsics) -> _Crop:
     )
 
 
-def _mean_depth(mask: MaskImage, depth_m: DepthImage, profile: Profile) -> float | None:
-    """Mean of the depths under the mask, without what is far from their median; None with too few pixels."""
+def _depth(mask: MaskImage, depth_m: DepthImage, profile: Profile) -> float | None:
+    """Mean (of a mask's centroid: median) of the depths under the mask, without what is far from their median.
+
+    None with too few pixels.
+    """
     nearest, farthest = _LEAST_DEPTH_M, _MOST_DEPTH_M
-    if profile.depth_trim_m is not None:
-        # A grid of pixels is enough: the median only has to lie on the object.
+    median = None
+    if profile.depth_trim_m is not None or profile.measurement == "mask_centroid":
+        # A grid of pixels is enough.
         step = max(1, int(np.sqrt(mask.size / _MEDIAN_PIXELS)))
         depths = depth_m[::step, ::step][mask[::step, ::step]]
         depths = depths[depths > 0]
         if len(depths):
             median = float(np.partition(depths, len(depths) // 2)[len(depths) // 2])
-            nearest, farthest = max(median - profile.depth_trim_m, _LEAST_DEPTH_M), median + profile.depth_trim_m
+    if median is not None and profile.depth_trim_m is not None:
+        nearest, farthest = max(median - profile.depth_trim_m, _LEAST_DEPTH_M), median + profile.depth_trim_m
     is_used = cv2.bitwise_and(cv2.inRange(depth_m, nearest, farthest), mask.view(np.uint8))
     if cv2.countNonZero(is_used) < profile.min_depth_pixels:
         return None
-    return float(cv2.mean(depth_m, is_used)[0])
+    return median if profile.measurement == "mask_centroid" else float(cv2.mean(depth_m, is_used)[0])
 
 
 class _View(NamedTuple):

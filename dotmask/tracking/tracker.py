@@ -7,7 +7,7 @@ import numpy as np
 
 from dotmask.profiles import Profile
 from dotmask.records import Detections, FloatArray, Observation, Track
-from dotmask.tracking.association import associate
+from dotmask.tracking.association import Associate, associate
 from dotmask.tracking.ekf import initiate, update
 from dotmask.tracking.motion_model import predict
 
@@ -40,6 +40,7 @@ def track_objects(
     timestamp_s: float,
     T_world_camera: FloatArray,
     profile: Profile,
+    associate: Associate = associate,
 ) -> TrackerState:
     """The state after one frame; `state` itself stays as it is.
 
@@ -56,6 +57,7 @@ def track_objects(
         timestamp_s: of this frame.
         T_world_camera: (4, 4) camera pose at this frame.
         profile: parameters.
+        associate: pairs tracks and observations.
 
     Raises:
         ValueError: the frame is not later than the state.
@@ -135,7 +137,8 @@ def widen(observation: Observation, missing_share: FloatArray, profile: Profile)
         ]
     )
     hidden_m *= model.hidden_factor
-    return replace(observation, covariance=observation.covariance + np.diag(hidden_m**2))
+    J = observation.model.jacobian(observation.position_camera)
+    return replace(observation, covariance=observation.covariance + J @ np.diag(hidden_m**2) @ J.T)
 
 
 def _box_size(observation: Observation, detections: Detections) -> FloatArray:

@@ -19,6 +19,7 @@ from dotmask.records import Detections, Intrinsics, MaskedDepth, Observation, Rg
 from dotmask.segmentation.selection import select_detections
 from dotmask.tracking.ekf import initiate, update
 from dotmask.tracking.measurement import observe
+from dotmask.tracking.measurement_model import CAMERA_POINT
 from dotmask.tracking.motion_model import predict
 from dotmask.tracking.tracker import TrackerState, track_objects
 
@@ -58,7 +59,9 @@ def test_nees_and_nis_are_consistent_on_the_exact_model(profile, class_name) -> 
                 x = np.concatenate([x[:3] + dt * x[3:] + 0.5 * dt**2 * a, x[3:] + dt * a])
             T = turned(k)
             z = T[:3, :3].T @ (x[:3] - T[:3, 3]) + root @ rng.normal(size=3)
-            seen = Observation(position_camera=z, covariance=R, class_name=class_name, detection_index=0)
+            seen = Observation(
+                position_camera=z, covariance=R, class_name=class_name, detection_index=0, model=CAMERA_POINT
+            )
             if track is None:
                 track = initiate(seen, ONE, 0.0, T, profile, 1)
             else:
@@ -87,7 +90,11 @@ def test_the_covariance_stays_symmetric_and_positive_definite(positions, sigma, 
     T = np.eye(4)
     T[:3, :3] = Rotation.from_rotvec([0.3, angle, -0.2]).as_matrix()
     start = Observation(
-        position_camera=np.array([0, 0, 2.0]), covariance=sigma**2 * np.eye(3), class_name="person", detection_index=0
+        position_camera=np.array([0, 0, 2.0]),
+        covariance=sigma**2 * np.eye(3),
+        class_name="person",
+        detection_index=0,
+        model=CAMERA_POINT,
     )
     track = initiate(start, ONE, 0.0, T, CALIBRATED, 1)
     for k, position in enumerate(positions):

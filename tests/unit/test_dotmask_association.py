@@ -7,6 +7,7 @@ from scipy.stats import chi2
 from dotmask.profiles import PAPER
 from dotmask.records import Observation, Track
 from dotmask.tracking.association import associate, chi_square_quantile, squared_mahalanobis
+from dotmask.tracking.measurement_model import CAMERA_POINT
 
 SIGMA = 0.1
 
@@ -33,6 +34,7 @@ def seen(position, class_name="chair", index=0) -> Observation:
         covariance=SIGMA**2 * np.eye(3),
         class_name=class_name,
         detection_index=index,
+        model=CAMERA_POINT,
     )
 
 

@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 from dotmask.profiles import PAPER
 from dotmask.records import Detections, Observation
 from dotmask.tracking.ekf import initiate, innovate, measurement_jacobian, update
+from dotmask.tracking.measurement_model import CAMERA_POINT
 from dotmask.tracking.motion_model import predict
 
 DETECTIONS = Detections(
@@ -21,6 +22,7 @@ def observation(position, covariance) -> Observation:
         covariance=np.asarray(covariance, float),
         class_name="person",
         detection_index=0,
+        model=CAMERA_POINT,
     )
 
 
@@ -113,7 +115,7 @@ def test_misprint_c_the_gain_is_6x3_and_moves_the_velocity() -> None:
     born = initiate(observation([0, 0, 2], 1e-4 * np.eye(3)), DETECTIONS, 0.0, np.eye(4), PAPER, 1)
     after = update(predict(born, 0.1, PAPER), observation([0.1, 0, 2], 1e-4 * np.eye(3)), DETECTIONS, np.eye(4))
     assert after.velocity_world[0] == pytest.approx(1.0, abs=0.05)
-    P, H = predict(born, 0.1, PAPER).covariance, measurement_jacobian(np.eye(4))
+    P, H = predict(born, 0.1, PAPER).covariance, measurement_jacobian(born.position_world, CAMERA_POINT, np.eye(4))
     assert (P @ H.T @ np.linalg.inv(H @ P @ H.T)).shape == (6, 3)
 
 

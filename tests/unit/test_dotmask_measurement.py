@@ -80,10 +80,23 @@ def test_paper_covariance_is_the_sensors(z) -> None:
 def test_calibrated_covariance_couples_depth_and_sideways_off_the_axis() -> None:
     depth, mask = wall(8.0), rectangle(20, 60, 80, 150)
     depth[mask] = 3.0
-    [seen] = observe(detect(mask), frame(depth), CALIBRATED)
+    still = replace(CALIBRATED, noise=replace(CALIBRATED.noise, pose_rotation_sigma_rad=0.0))
+    [seen] = observe(detect(mask), frame(depth), still)
     slope = (50 - 159.5) / 260
     sigma_z = 0.0012 + 0.0019 * 2.6**2
     assert seen.covariance[0, 2] == pytest.approx(slope * sigma_z**2, rel=1e-4)
+
+
+def test_an_uncertain_turn_of_the_camera_moves_a_point_across_its_ray() -> None:
+    depth, mask = wall(8.0), rectangle(20, 60, 80, 150)
+    depth[mask] = 3.0
+    turning = replace(CALIBRATED, noise=replace(CALIBRATED.noise, pose_rotation_sigma_rad=0.01))
+    still = replace(CALIBRATED, noise=replace(CALIBRATED.noise, pose_rotation_sigma_rad=0.0))
+    [turned], [seen] = observe(detect(mask), frame(depth), turning), observe(detect(mask), frame(depth), still)
+    added, p = turned.covariance - seen.covariance, seen.position_camera
+    # Turns by w shift p by w x p: as far as sqrt(2) |p| sigma in all, and not at all along p.
+    assert np.trace(added) == pytest.approx(2 * 0.01**2 * p @ p, rel=1e-6)
+    assert abs(p @ added @ p) < 1e-12
 
 
 def test_trimmed_mean_ignores_a_mask_that_leaks_onto_the_wall() -> None:

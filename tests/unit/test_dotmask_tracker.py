@@ -5,6 +5,7 @@ import pytest
 
 from dotmask.profiles import CALIBRATED, PAPER
 from dotmask.records import Detections, Observation
+from dotmask.tracking.measurement_model import CAMERA_POINT
 from dotmask.tracking.tracker import TrackerState, track_objects, widen
 
 DT = 1 / 30
@@ -28,6 +29,7 @@ def frame(*objects, shape=(24, 32)):
             covariance=0.02**2 * np.eye(3),
             class_name=o[1],
             detection_index=i,
+            model=CAMERA_POINT,
         )
         for i, o in enumerate(objects)
     )
