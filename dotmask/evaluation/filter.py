@@ -100,20 +100,19 @@ def filter_errors(samples: Sequence[BeliefSample]) -> FilterErrors:
     has_ideal = np.array([s.ideal_world is not None for s in samples])
     ideals = np.array([s.ideal_world for s in samples if s.ideal_world is not None]).reshape(-1, 3)
     ideal_errors = means[has_ideal, :3] - ideals
-    position, velocity = (_rotated(poses, part) for part in (errors[:, :3], errors[:, 3:]))
-    ideal = _rotated(poses[has_ideal], ideal_errors)
+    position, velocity = errors[:, :3], errors[:, 3:]
     nis = [s.innovation.nis for s in samples if s.innovation is not None]
     rays = centres - poses[:, :3, 3]
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
     return FilterErrors(
         samples=len(samples),
         position_rmse_m=_rms_norm(position),
-        position_bias_m=_bias(position, instances),
-        position_bias_ray_m=float(np.mean((errors[:, :3] * rays).sum(axis=1))),
-        position_rmse_ideal_m=_rms_norm(ideal),
-        position_bias_ideal_m=_bias(ideal, instances[has_ideal]),
+        position_bias_m=_bias(_rotated(poses, position), instances),
+        position_bias_ray_m=float(np.mean((position * rays).sum(axis=1))),
+        position_rmse_ideal_m=_rms_norm(ideal_errors),
+        position_bias_ideal_m=_bias(_rotated(poses[has_ideal], ideal_errors), instances[has_ideal]),
         velocity_rmse_m_s=_rms_norm(velocity),
-        velocity_bias_m_s=_bias(velocity, instances),
+        velocity_bias_m_s=_bias(_rotated(poses, velocity), instances),
         nees=float(np.mean(normalised_squares(errors, covariances))),
         nees_bounds=chi_square_mean_bounds(6, len(samples)),
         nees_ideal=float(np.mean(normalised_squares(ideal_errors, covariances[has_ideal][:, :3, :3])))

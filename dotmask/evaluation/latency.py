@@ -1,13 +1,14 @@
 """Judges how soon the moving object classification answers when an object starts to move, or comes to rest.
 
-What moves a little is truly moving in some frames and truly at rest in the next (a person who breathes). So a motion is
-what lasts `SPELL_FRAMES` frames in which the object is seen, and so is a rest: shorter spells of the other truth neither
+What moves a little is truly moving in some frames and truly at rest in the next (a person who breathes). So a motion
+or a rest is what lasts `SPELL_FRAMES` frames in which the object is seen; shorter spells of the other truth neither
 begin nor end one.
 """
 
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -58,7 +59,7 @@ def latency_scores(records: Iterable[ClassificationRecord]) -> LatencyScores:
     for unsorted in by_instance.values():
         history = sorted(unsorted, key=lambda r: r.frame)
         beginnings = _beginnings(history)
-        for begin, end in zip(beginnings, [*beginnings[1:], len(history)], strict=True):
+        for begin, end in pairwise([*beginnings, len(history)]):
             first = history[begin]
             waits = (r.frame - first.frame for r in history[begin:end] if r.is_flagged is first.is_moving)
             latency = next(waits, None)

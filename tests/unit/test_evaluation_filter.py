@@ -79,8 +79,9 @@ def test_bias_is_of_each_instance_and_spread_is_the_rest() -> None:
     rng = np.random.default_rng(3)
     noise = rng.normal(0, 0.2, (300, 6))
     noise -= noise.mean(axis=0)
-    one = [sample(e + [0.4, 0, 0, 0, 0, 0.1], instance=1) for e in noise]
-    other = [sample(e - [0.4, 0, 0, 0, 0, 0.1], instance=2) for e in noise]
+    offset = np.array([0.4, 0, 0, 0, 0, 0.1])
+    one = [sample(e + offset, instance=1) for e in noise]
+    other = [sample(e - offset, instance=2) for e in noise]
     result = filter_errors(one + other)
     assert result.position_bias_m == pytest.approx(0.4)
     assert result.velocity_bias_m_s == pytest.approx(0.1)

@@ -84,6 +84,11 @@ def test_a_gap_does_not_end_a_motion() -> None:
     assert (scores.flag_median_frames, scores.unanswered) == (11, 0)
 
 
+def test_an_object_that_is_seen_for_a_moment_begins_nothing() -> None:
+    scores = latency_scores(history("M" * 9, "-" * 9) + history(MOTION, "F" * 12, instance_id=2))
+    assert (scores.flag_median_frames, scores.unanswered) == (0, 0)
+
+
 def test_order_of_the_records_does_not_matter() -> None:
     records = history(REST + MOTION, "-" * 15 + "F" * 9) + history(MOTION, "--" + "F" * 10, instance_id=2)
     assert latency_scores(records) == latency_scores(records[::-1])
