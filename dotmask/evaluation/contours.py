@@ -48,9 +48,7 @@ def _region(mask: MaskImage, truth: MaskImage, margin_px: int) -> tuple[slice, s
 
 def _contour(mask: MaskImage) -> MaskImage:
     """Where a pixel of `mask` differs from its neighbour to the right, below, or right below."""
-    gradient = cv2.morphologyEx(
-        mask.view(np.uint8), cv2.MORPH_GRADIENT, _SQUARE, anchor=(0, 0), borderType=cv2.BORDER_REPLICATE
-    )
+    gradient = cv2.morphologyEx(mask.view(np.uint8), cv2.MORPH_GRADIENT, _SQUARE, anchor=(0, 0))
     return np.asarray(gradient, np.bool_)
 
 

@@ -41,6 +41,11 @@ def test_an_object_that_appears_in_motion_is_no_start() -> None:
     assert (scores.starts, scores.start_median_frames, scores.start_max_frames) == (0, None, None)
 
 
+def test_a_moment_of_rest_before_the_motion_makes_no_start() -> None:
+    scores = latency_scores(history("---" + MOTION, "-" * 5 + "F" * 10))
+    assert (scores.starts, scores.flag_median_frames) == (0, 2)
+
+
 def test_the_longest_start_and_the_missed_one_are_seen() -> None:
     records = [
         r
