@@ -238,6 +238,7 @@ def _classified(
             instance_id=instance,
             class_name=actors[instance].class_name,
             is_moving=actors[instance].is_moving,
+            true_speed_m_s=float(np.linalg.norm(actors[instance].velocity_world)),
             # What has no track is masked by the pipeline, hence answered as moving.
             is_flagged=verdict is None or verdict.is_moving,
             speed_m_s=None if verdict is None else verdict.speed_m_s,

@@ -113,7 +113,7 @@ class MocReport(Part):
         flag_latency_frames: median, from the beginning of a motion or the appearance of a mover to its first flag.
         unflag_latency_frames: median, from the beginning of a rest or the appearance of a resting object to its first
             frame without flag.
-        starts: motions that begin while the object is tracked and not flagged.
+        starts: times that an object sets off (its centre, above 0.1 m/s) that was tracked, at rest and not flagged.
         missed_starts: those of them that were never flagged.
         start_latency_frames: median over the flagged starts.
         start_latency_max_frames: the longest of them.

@@ -18,6 +18,7 @@ class ClassificationRecord:
         instance_id: the true instance.
         class_name: its true class.
         is_moving: the truth.
+        true_speed_m_s: of its centre.
         is_flagged: the answer.
         speed_m_s: that its track was given; None: it has no track.
     """
@@ -26,6 +27,7 @@ class ClassificationRecord:
     instance_id: int
     class_name: str
     is_moving: bool
+    true_speed_m_s: float
     is_flagged: bool
     speed_m_s: float | None
 

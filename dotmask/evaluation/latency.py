@@ -6,7 +6,7 @@ begin nor end one.
 """
 
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -16,22 +16,26 @@ from dotmask.evaluation.classification import ClassificationRecord
 
 SPELL_FRAMES = 10
 
+SETS_OFF_M_S = 0.1
+"""Speed of the centre above which an object is on its way: more than a standing person sways, less than a step."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LatencyScores:
     """How many frames the answers took; None where there was no answer to wait for.
 
-    A start is a motion that begins after a rest, while the object is tracked and not flagged: a person who stands and
-    walks off. What is already flagged when it starts, or appears in motion, is no start.
+    A start is what a person does who stands and walks off, or a chair that is pushed: the centre sets off after a
+    rest, in view, and in some of the last `SPELL_FRAMES` frames before the object was tracked and not flagged. The
+    hands may move, and be flagged, earlier: then the latency is 0. What appears on its way is no start, nor is a
+    motion that stays in place.
 
     Attributes:
-        flag_median_frames: from the beginning of a motion (starts, appearances and all others) to the first flagged
-            frame.
-        unflag_median_frames: from the beginning of a rest (of an object that appears as well) to the first frame
+        flag_median_frames: from the beginning of a motion, or the appearance of a mover, to the first flagged frame.
+        unflag_median_frames: from the beginning of a rest, or the appearance of a resting object, to the first frame
             without flag.
         unanswered: motions and rests that ended, or were still on at the last frame, before the answer came.
         starts: number of starts.
-        missed_starts: those that were never flagged.
+        missed_starts: those that were never flagged before the centre rested again.
         start_median_frames: from a start to the first flagged frame, over the starts that were flagged.
         start_max_frames: the longest of them.
     """
@@ -53,28 +57,14 @@ def latency_scores(records: Iterable[ClassificationRecord]) -> LatencyScores:
     by_instance: dict[int, list[ClassificationRecord]] = defaultdict(list)
     for record in records:
         by_instance[record.instance_id].append(record)
-    latencies: dict[bool, list[int]] = {True: [], False: []}
-    starts: list[int | None] = []
-    unanswered = 0
-    for unsorted in by_instance.values():
-        history = sorted(unsorted, key=lambda r: r.frame)
-        beginnings = _beginnings(history)
-        for begin, end in pairwise([*beginnings, len(history)]):
-            first = history[begin]
-            waits = (r.frame - first.frame for r in history[begin:end] if r.is_flagged is first.is_moving)
-            latency = next(waits, None)
-            if latency is None:
-                unanswered += 1
-            else:
-                latencies[first.is_moving].append(latency)
-            is_after_rest = first.is_moving and begin != beginnings[0]
-            if is_after_rest and history[begin - 1].frame == first.frame - 1 and not history[begin - 1].is_flagged:
-                starts.append(latency)
-    flagged = [latency for latency in starts if latency is not None]
+    histories = [sorted(history, key=lambda r: r.frame) for history in by_instance.values()]
+    waits = [(s[0].is_moving, _wait(s, s[0].is_moving)) for history in histories for s in _motions_and_rests(history)]
+    starts = [_wait(way, True) for history in histories for way in _starts(history)]
+    flagged = [wait for wait in starts if wait is not None]
     return LatencyScores(
-        flag_median_frames=_median(latencies[True]),
-        unflag_median_frames=_median(latencies[False]),
-        unanswered=unanswered,
+        flag_median_frames=_median([wait for moves, wait in waits if moves and wait is not None]),
+        unflag_median_frames=_median([wait for moves, wait in waits if not moves and wait is not None]),
+        unanswered=sum(wait is None for _, wait in waits),
         starts=len(starts),
         missed_starts=len(starts) - len(flagged),
         start_median_frames=_median(flagged),
@@ -82,17 +72,38 @@ def latency_scores(records: Iterable[ClassificationRecord]) -> LatencyScores:
     )
 
 
-def _beginnings(history: Sequence[ClassificationRecord]) -> list[int]:
-    """Where in `history` motions and rests begin, in turn; the first of them is the object's first."""
+def _motions_and_rests(history: Sequence[ClassificationRecord]) -> Iterator[Sequence[ClassificationRecord]]:
+    for begin, end in pairwise([*_beginnings([r.is_moving for r in history]), len(history)]):
+        yield history[begin:end]
+
+
+def _starts(history: Sequence[ClassificationRecord]) -> Iterator[Sequence[ClassificationRecord]]:
+    """From each start on, until the centre rests again."""
+    is_on_its_way = [r.true_speed_m_s > SETS_OFF_M_S for r in history]
+    beginnings = _beginnings(is_on_its_way)
+    for begin, end in pairwise([*beginnings[1:], len(history)]):
+        before, way = history[begin - SPELL_FRAMES : begin], history[begin:end]
+        is_in_view = before[-1].frame == way[0].frame - 1
+        if is_on_its_way[begin] and is_in_view and not all(r.is_flagged for r in before):
+            yield way
+
+
+def _beginnings(truths: Sequence[bool]) -> list[int]:
+    """Where spells of True and of False begin, in turn; shorter ones than `SPELL_FRAMES` are passed over."""
     beginnings: list[int] = []
     begin = 0
-    for k, record in enumerate(history):
-        if record.is_moving is not history[begin].is_moving:
+    for k, truth in enumerate(truths):
+        if truth is not truths[begin]:
             begin = k
-        is_new = not beginnings or history[beginnings[-1]].is_moving is not record.is_moving
+        is_new = not beginnings or truths[beginnings[-1]] is not truth
         if is_new and k - begin + 1 == SPELL_FRAMES:
             beginnings.append(begin)
     return beginnings
+
+
+def _wait(spell: Sequence[ClassificationRecord], answer: bool) -> int | None:
+    """Frames from the beginning of `spell` to the first with that answer; None: it never came."""
+    return next((r.frame - spell[0].frame for r in spell if r.is_flagged is answer), None)
 
 
 def _median(values: Sequence[int]) -> float | None:

@@ -324,6 +324,7 @@ def test_walkers_are_flagged_and_standing_chairs_are_not(pictures, calibrated) -
                     instance_id=instance,
                     class_name=track.class_name,
                     is_moving=moving,
+                    true_speed_m_s=float(np.linalg.norm(pictures[k].velocities[instance])),
                     is_flagged=flagged,
                     speed_m_s=track.verdict.speed_m_s,
                 )

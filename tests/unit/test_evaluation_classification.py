@@ -7,7 +7,13 @@ from dotmask.evaluation.classification import ClassificationRecord, Confusion, c
 
 def record(is_moving: bool, is_flagged: bool) -> ClassificationRecord:
     return ClassificationRecord(
-        frame=0, instance_id=1, class_name="person", is_moving=is_moving, is_flagged=is_flagged, speed_m_s=0.0
+        frame=0,
+        instance_id=1,
+        class_name="person",
+        is_moving=is_moving,
+        true_speed_m_s=0.0,
+        is_flagged=is_flagged,
+        speed_m_s=0.0,
     )
 
 

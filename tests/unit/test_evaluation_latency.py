@@ -7,13 +7,14 @@ REST, MOTION = "-" * 12, "M" * 12
 
 
 def history(truth: str, flags: str, instance_id: int = 1) -> list[ClassificationRecord]:
-    """One letter per frame: M moving, F flagged, '-' neither, ' ' no record."""
+    """One letter per frame: M moving, B moving in place (breathing), F flagged, '-' neither, ' ' no record."""
     return [
         ClassificationRecord(
             frame=k,
             instance_id=instance_id,
             class_name="person",
-            is_moving=moving == "M",
+            is_moving=moving in "MB",
+            true_speed_m_s={"M": 1.0, "B": 0.03, "-": 0.0}[moving],
             is_flagged=flag == "F",
             speed_m_s=None,
         )
@@ -57,9 +58,28 @@ def test_the_longest_start_and_the_missed_one_are_seen() -> None:
     assert (scores.start_median_frames, scores.start_max_frames) == (2, 9)
 
 
-def test_an_object_that_is_flagged_already_is_no_start_but_answered_at_once() -> None:
-    scores = latency_scores(history(REST + MOTION, "-" * 6 + "F" * 18))
+def test_an_object_that_is_flagged_while_it_rests_is_no_start_but_answered_at_once() -> None:
+    scores = latency_scores(history(REST + MOTION, "--" + "F" * 22))
     assert (scores.starts, scores.flag_median_frames) == (0, 0)
+
+
+def test_what_is_flagged_shortly_before_it_sets_off_has_no_latency() -> None:
+    scores = latency_scores(history(REST + MOTION, "---" + "F" * 21))
+    assert (scores.starts, scores.start_max_frames) == (1, 0)
+    fallen_back = latency_scores(history(REST + MOTION, "---" + "F" * 6 + "-" * 5 + "F" * 10))
+    assert (fallen_back.starts, fallen_back.start_max_frames) == (1, 2)
+
+
+def test_a_start_counts_from_where_the_centre_sets_off() -> None:
+    scores = latency_scores(history(REST + "B" * 30 + MOTION, "-" * 44 + "F" * 10))
+    assert (scores.flag_median_frames, scores.starts, scores.start_max_frames) == (32, 1, 2)
+    in_place = latency_scores(history(REST + "B" * 30 + REST, "-" * 54))
+    assert (in_place.starts, in_place.unanswered) == (0, 1)
+
+
+def test_a_start_that_is_flagged_after_the_motion_is_missed() -> None:
+    scores = latency_scores(history(REST + MOTION + REST, "-" * 24 + "F" * 12))
+    assert (scores.starts, scores.missed_starts) == (1, 1)
 
 
 def test_an_object_that_returns_in_motion_is_no_start() -> None:

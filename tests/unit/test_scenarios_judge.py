@@ -37,7 +37,7 @@ def actor(name: str, instance: int, is_moving: bool) -> ObjectTruth:
         instance_id=instance,
         T_world_object=np.eye(4),
         centre_world=np.array([0.0, 0.0, 3.0]),
-        velocity_world=np.zeros(3),
+        velocity_world=np.array([float(is_moving), 0.0, 0.0]),
         surface_speed_m_s=float(is_moving),
         is_moving=is_moving,
         visible_pixels=int(np.count_nonzero(instance == IDS)),
