@@ -68,10 +68,16 @@ class MeasurementNoise:
     """The model behind R. The paper calls its diagonal "the imprecision of the RGB-D camera" and gives no values.
 
     Attributes:
-        pixel_sigma_px: of the box centre, both axes; becomes `sigma z / f` metres.
-        depth_sigma_m: of the mean depth at the near limit.
+        pixel_sigma_px: of the measured centre, whatever the mask, both axes; becomes `sigma z / f` metres.
+        depth_sigma_m: of the depth of one pixel at the near limit.
         depth_sigma_per_m: growth with (z - 0.4 m)², 1/m; structured light: 0.0019 (Nguyen et al. 2012, "Modeling
             Kinect sensor noise", eq. 5).
+        averages_pixels: the depth of n pixels is as uncertain as that of one over sqrt(n); else as that of one.
+        edge_sigma_px: of each border of a mask. A border that is right to the pixel is uniform over one pixel,
+            `1/sqrt(12)`; larger for a segmenter with blurred borders.
+        depth_step_per_m: depth is rounded to steps of this times z², 1/m; structured light: 0.00284 (1/8 px of
+            disparity, Khoshelham and Elberink 2012, "Accuracy and resolution of Kinect depth data").
+        depth_rounding_m: step of the depth image's numbers: 1/5000 m in files of the TUM benchmark.
         is_diagonal: leave out that an error in depth moves x and y along the viewing ray.
         notices_hidden_sides: look whether the box ends at the image border or at something nearer.
         occluder_margin_m: how much nearer than the object an occluder must be at 0 m; grows by 0.02 z².
@@ -83,6 +89,10 @@ class MeasurementNoise:
     depth_sigma_m: float
     depth_sigma_per_m: float
     is_diagonal: bool
+    averages_pixels: bool = False
+    edge_sigma_px: float = 0.0
+    depth_step_per_m: float = 0.0
+    depth_rounding_m: float = 0.0
     notices_hidden_sides: bool = False
     occluder_margin_m: float = 0.12
     pose_position_sigma_m: float = 0.0
@@ -307,10 +317,14 @@ CALIBRATED = Profile(
     confirming_hits=3,
     measurement="bbox_centre",
     noise=MeasurementNoise(
-        pixel_sigma_px=1.0,
+        pixel_sigma_px=0.0,
         depth_sigma_m=0.0012,
         depth_sigma_per_m=0.0019,
         is_diagonal=False,
+        averages_pixels=True,
+        edge_sigma_px=0.29,
+        depth_step_per_m=0.00284,
+        depth_rounding_m=0.0002,
         notices_hidden_sides=True,
         pose_position_sigma_m=0.003,
         pose_rotation_sigma_rad=0.002,

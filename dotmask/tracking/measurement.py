@@ -10,7 +10,13 @@ from dotmask.geometry import back_project
 from dotmask.profiles import Profile
 from dotmask.records import DepthImage, Detections, FloatArray, Intrinsics, MaskImage, Observation, RgbdFrame
 from dotmask.tracking.measurement_model import CAMERA_POINT, PixelDepth
-from dotmask.tracking.measurement_noise import measurement_covariance
+from dotmask.tracking.measurement_noise import (
+    box_centre_variance,
+    centroid_variance,
+    mean_depth_variance,
+    measurement_covariance,
+    median_depth_variance,
+)
 
 _BAND_PX = 8
 """How far outside a box an occluder is looked for: past the ring without depth that sensors leave at depth edges."""
@@ -54,15 +60,11 @@ def observe(detections: Detections, frame: RgbdFrame, profile: Profile) -> tuple
         box = detections.boxes_px[index]
         crop = _crop(box, frame.intrinsics)
         mask, depth_m = detections.masks[index][crop.slices], frame.depth_m[crop.slices]
-        depth = _depth(mask, depth_m, profile)
-        if depth is None:
+        depth_seen = _depth(mask, depth_m, profile)
+        if depth_seen is None:
             continue
-        centre = 0.5 * (box[:2] + box[2:])
-        if profile.measurement == "mask_centroid":
-            moments = cv2.moments(mask.view(np.uint8), binaryImage=True)
-            centre = np.array(
-                [crop.u_start + moments["m10"] / moments["m00"], crop.v_start + moments["m01"] / moments["m00"]]
-            )
+        centre, centre_variance = _centre(mask, box, crop, profile)
+        depth, depth_variance = depth_seen
         p_camera = back_project(centre[None], np.array([depth]), frame.intrinsics)[0]
         class_model = profile.class_model(class_name)
         is_partial = False
@@ -72,7 +74,14 @@ def observe(detections: Detections, frame: RgbdFrame, profile: Profile) -> tuple
         observations.append(
             Observation(
                 position_camera=p_camera,
-                covariance=measurement_covariance(p_camera, model, class_model, frame.intrinsics, profile.noise),
+                covariance=measurement_covariance(
+                    p_camera,
+                    np.array([*centre_variance, depth_variance]),
+                    model,
+                    class_model,
+                    frame.intrinsics,
+                    profile.noise,
+                ),
                 class_name=class_name,
                 detection_index=index,
                 mask=detections.masks[index],
@@ -93,10 +102,20 @@ def _crop(box_px: FloatArray, intrinsics: Intrinsics) -> _Crop:
     )
 
 
-def _depth(mask: MaskImage, depth_m: DepthImage, profile: Profile) -> float | None:
+def _centre(mask: MaskImage, box_px: FloatArray, crop: _Crop, profile: Profile) -> tuple[FloatArray, FloatArray]:
+    """(2,) u and v of the box's centre or of the mask's centroid, pixels, and their variances (2,)."""
+    if profile.measurement != "mask_centroid":
+        return 0.5 * (box_px[:2] + box_px[2:]), box_centre_variance(profile.noise)
+    moments = cv2.moments(mask.view(np.uint8), binaryImage=True)
+    area = moments["m00"]
+    centroid = np.array([moments["m10"] / area, moments["m01"] / area])
+    return np.add(centroid, (crop.u_start, crop.v_start)), centroid_variance(mask, centroid, area, profile.noise)
+
+
+def _depth(mask: MaskImage, depth_m: DepthImage, profile: Profile) -> tuple[float, float] | None:
     """Mean (of a mask's centroid: median) of the depths under the mask, without what is far from their median.
 
-    None with too few pixels.
+    Together with its variance, m and m²; None with too few pixels.
     """
     nearest, farthest = _LEAST_DEPTH_M, _MOST_DEPTH_M
     median = None
@@ -109,10 +128,14 @@ def _depth(mask: MaskImage, depth_m: DepthImage, profile: Profile) -> float | No
             median = float(np.partition(depths, len(depths) // 2)[len(depths) // 2])
     if median is not None and profile.depth_trim_m is not None:
         nearest, farthest = max(median - profile.depth_trim_m, _LEAST_DEPTH_M), median + profile.depth_trim_m
-    is_used = cv2.bitwise_and(cv2.inRange(depth_m, nearest, farthest), mask.view(np.uint8))
-    if cv2.countNonZero(is_used) < profile.min_depth_pixels:
+    is_used = np.asarray(cv2.bitwise_and(cv2.inRange(depth_m, nearest, farthest), mask.view(np.uint8)), np.uint8)
+    pixels = cv2.countNonZero(is_used)
+    if pixels < profile.min_depth_pixels:
         return None
-    return median if profile.measurement == "mask_centroid" else float(cv2.mean(depth_m, is_used)[0])
+    if median is not None and profile.measurement == "mask_centroid":
+        return median, median_depth_variance(median, len(depths), profile.noise)
+    mean = float(cv2.mean(depth_m, is_used)[0])
+    return mean, mean_depth_variance(mean, depth_m, is_used, pixels, profile.noise)
 
 
 class _View(NamedTuple):
