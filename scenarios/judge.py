@@ -100,8 +100,11 @@ class Judge:
             if instance not in actors:
                 continue
             track = by_detection.get(index)
-            # What has no track is masked by the pipeline, hence answered as moving.
-            flagged = track is None or (track.verdict is not None and track.verdict.is_moving)
+            if track is None:
+                # No belief to ask: what became of its pixels is the answer.
+                flagged = not result.front_end.masked.mo_mdi_m[detections.masks[index]].any()
+            else:
+                flagged = track.verdict is not None and track.verdict.is_moving
             self._classified.append(
                 ClassificationRecord(
                     frame=frame.index,
