@@ -24,7 +24,7 @@ STANDING = CameraSpec(
     cx=319.5,
     cy=239.5,
     path="static",
-    position_m=(0.0, -2.2, 1.4),
+    position_m=(0.0, -2.1, 1.4),
     tilt_deg=12,
     amplitude=0.3,
 )
@@ -95,7 +95,7 @@ SCENARIOS = (
         frame_rate_hz=15.0,
         room="bare",
         camera=STANDING,
-        people=_walker((1.5, 0.9), (-1.5, 0.9)),
+        people=_walker((1.5, 0.9), (-2.0, 0.9)),
     ),
     Scenario(
         name="new_mover",
@@ -119,9 +119,9 @@ SCENARIOS = (
     ),
     Scenario(
         name="approaching_person",
-        description="A robot drives up to a person who stands still, and back.",
+        description="A robot drives up to a person who stands still.",
         tags=("original", "robot", "idle"),
-        frames=40,
+        frames=31,
         frame_rate_hz=8.0,
         room="corridor",
         camera=RobotCameraSpec(
