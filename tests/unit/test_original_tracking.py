@@ -5,6 +5,7 @@ a higher frame rate: `original` does not know any.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -280,6 +281,14 @@ def test_a_person_at_rest_is_flagged_by_noise_along_one_axis(sigma_m: float, sha
     assert flagged == pytest.approx(share, abs=0.04)
 
 
+def test_the_threshold_is_on_each_axis_by_itself() -> None:
+    """0.008 m/s along two axes is faster than 0.01 m/s, and not moving."""
+    track = play("original", [[("person", 300.0, 2.0)]] * 2)[-1].tracks[0]
+    for velocity, moves in (((0.008, 0.008, 0.0), False), ((0.0, 0.0, -0.011), True)):
+        faster = replace(track, mean=np.array([0.0, 0.0, 2.0, *velocity]))
+        assert original._verdict(faster, track).is_moving is moves
+
+
 # 8. A deformation test that takes growth for deformation
 
 
@@ -293,6 +302,13 @@ def square(side: int) -> np.ndarray:
 def test_growth_lowers_the_iou(growth: float, iou: float) -> None:
     grown = square(round(200 * (1 + growth)))
     assert centred_iou(square(200), np.roll(grown, (31, 57), axis=(0, 1))) == pytest.approx(iou, abs=5e-4)
+
+
+def test_masks_are_compared_with_their_boxes_centres_on_each_other() -> None:
+    """A small square lies in the hole of a large frame, and touches it in no other place."""
+    frame = square(60)
+    frame[70:110, 90:130] = False
+    assert centred_iou(square(20), frame) == 0.0
 
 
 def test_iou_of_a_mask_with_itself_and_of_nothing() -> None:
@@ -364,7 +380,19 @@ def test_refining_with_the_same_pose_changes_nothing_and_before_the_first_frame_
         assert one.verdict == other.verdict
 
 
-def test_the_camera_s_pose_carries_points_into_the_world() -> None:
+def test_the_next_frame_starts_from_the_refined_beliefs() -> None:
+    segmenter = Playback()
+    front_end = OriginalDotMask(segmenter)
+    segmenter.things = [CHAIR]
+    front_end.step(frame_of([CHAIR], 0, 4.0), STILL)
+    moved: FloatArray = np.eye(4)
+    moved[0, 3] = 1.0
+    refined = front_end.refine(moved).tracks[0]
+    result = front_end.step(frame_of([CHAIR], 1, 4.0), moved)
+    np.testing.assert_allclose(result.tracks[0].mean, refined.mean, atol=1e-9)
+
+
+def test_the_pose_of_the_camera_carries_points_into_the_world() -> None:
     """A thing at rest seen from two poses: the update expects it where it is."""
     segmenter = Playback()
     front_end = OriginalDotMask(segmenter)
