@@ -206,7 +206,9 @@ def run(
     methods: Annotated[str, typer.Option(help="Comma-separated: unmasked, mdi, dotmask.")] = "unmasked,mdi,dotmask",
     segmenter: Annotated[str, typer.Option(help="Segmenter: oracle.")] = "oracle",
     slam: Annotated[str, typer.Option(help="SLAM back end: embedded.")] = "embedded",
-    profile: Annotated[str, typer.Option(help="Parameters of the method: paper, calibrated.")] = "calibrated",
+    profile: Annotated[
+        str, typer.Option(help="Parameters of the method: paper, calibrated. original: as the authors' program is.")
+    ] = "calibrated",
     pose_feedback: Annotated[
         str | None, typer.Option(help="Pose for the tracker: previous, constant_velocity, refined. Default: profile's.")
     ] = None,

@@ -11,16 +11,30 @@ from scenarios.catalog import (
     gatherings,
     hard_views,
     movers,
+    original_failures,
     robot,
     smoke,
 )
 from scenarios.errors import unknown
 from scenarios.spec import Scenario
 
+MODULES = (
+    smoke,
+    fr3_walking,
+    fr3_sitting,
+    fr2,
+    fr3_household,
+    robot,
+    gatherings,
+    hard_views,
+    movers,
+    original_failures,
+)
+
 
 def _collect() -> dict[str, Scenario]:
     named: dict[str, Scenario] = {}
-    for module in (smoke, fr3_walking, fr3_sitting, fr2, fr3_household, robot, gatherings, hard_views, movers):
+    for module in MODULES:
         for scenario in module.SCENARIOS:
             if scenario.name in named:
                 raise ValueError(f"two scenarios are called {scenario.name}")

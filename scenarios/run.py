@@ -14,8 +14,9 @@ from typing import cast, get_args
 import cv2
 
 from dotmask.interfaces import Segmenter
+from dotmask.original import OriginalDotMask
 from dotmask.pipeline import ClosedLoop, DotMask, FrontEnd, MaskAll, Unmasked
-from dotmask.profiles import PoseFeedback, Profile
+from dotmask.profiles import ORIGINAL, PoseFeedback, Profile
 from dotmask.profiles import profile as get_profile
 from dotmask.records import FloatArray, RgbdFrame
 from dotmask.slam.embedded import EmbeddedSlam
@@ -32,10 +33,16 @@ from scenarios.world import RENDERERS, build_simulator
 from sim.records import SimFrame
 from sim.simulator import Simulator
 
+
+def _method(segmenter: Segmenter, chosen: Profile) -> FrontEnd:
+    """The method; the profile `original` is another program."""
+    return OriginalDotMask(segmenter) if chosen is ORIGINAL else DotMask(segmenter, chosen)
+
+
 METHODS: dict[str, Callable[[Segmenter, Profile], FrontEnd]] = {
     "unmasked": lambda segmenter, chosen: Unmasked(),
     "mdi": MaskAll,
-    "dotmask": DotMask,
+    "dotmask": _method,
 }
 """What may be compared: raw depth to both, all objects of interest removed from both, the method."""
 

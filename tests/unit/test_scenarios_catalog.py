@@ -17,7 +17,8 @@ from sim.scene import Frozen
 
 ASKED_FOR = {
     *BENCHMARK, "smoke", "robot_follows_person", "robot_corridor", "plaid_idle", "crossing", "crowd", "tilted",
-    "unknown_mover", "low_texture", "pushed_chair", "falling_bottle", "carried_cup",
+    "unknown_mover", "low_texture", "pushed_chair", "falling_bottle", "carried_cup", "detection_order",
+    "ageless_track", "fixed_time_step", "wide_covariance", "new_mover", "approaching_person",
 }  # fmt: skip
 NEAREST_TO_CAMERA_M = 0.35
 IN_WALKING_HEIGHT = (0.1, 1.7)
