@@ -1,6 +1,11 @@
-"""The people, chairs and camera of fr3_walking_xyz, and a segmenter with one fault in each."""
+"""A segmenter with one fault in each: on the people, chairs and camera of fr3_walking_xyz, or what shows it better.
+
+`fault_tilted` has the camera of `tilted`, `fault_merged` the people and the camera of `crowd`, where some hide each
+other in nearly all frames.
+"""
 
 from scenarios.catalog.fr3_walking import CHAIRS, PEOPLE
+from scenarios.catalog.gatherings import CROWD
 from scenarios.catalog.hard_views import ROLLING
 from scenarios.spec import (
     BordersSpec,
@@ -21,8 +26,10 @@ from scenarios.spec import (
     TourCameraSpec,
 )
 
+TAGS = ("faults",)
+
 FRAMES = 270
-"""Nine seconds: both people pass the camera, and a chair is pushed."""
+"""Nine seconds: both people pass the camera twice, and a chair is hit."""
 
 
 def _faulty(
@@ -31,7 +38,7 @@ def _faulty(
     return Scenario(
         name=f"fault_{name}",
         description=description,
-        tags=("faults",),
+        tags=TAGS,
         frames=FRAMES,
         camera=camera or CameraSpec(path="xyz"),
         people=PEOPLE,
@@ -70,10 +77,14 @@ SCENARIOS = (
         "Three instances in ten become two detections, in every frame anew.",
         FaultsSpec(split=SplitSpec(probability=0.3)),
     ),
-    _faulty(
-        "merged",
-        "Seven times in ten, people whose boxes touch become one detection.",
-        FaultsSpec(merged=MergedSpec(probability=0.7)),
+    CROWD.model_copy(
+        update={
+            "name": "fault_merged",
+            "description": "In a crowd, people whose boxes touch become one detection, seven times in ten.",
+            "tags": TAGS,
+            "frames": FRAMES,
+            "faults": FaultsSpec(merged=MergedSpec(probability=0.7)),
+        }
     ),
     _faulty(
         "identity_shuffle",

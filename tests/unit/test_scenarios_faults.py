@@ -488,12 +488,15 @@ def test_every_fault_is_off_by_default_and_has_a_scenario_in_which_it_acts_alone
     assert {names[0] for names in acting.values()} == set(FaultsSpec.model_fields)
 
 
-def test_the_fault_scenarios_have_the_frames_of_fr3_walking_xyz_but_for_the_tilted_camera() -> None:
+def test_the_fault_scenarios_have_the_frames_of_fr3_walking_xyz_but_for_two() -> None:
+    others = {"fault_tilted": "tilted", "fault_merged": "crowd"}
     for name, chosen in SCENARIOS.items():
         if "faults" in chosen.tags:
-            base = scenario("tilted" if name == "fault_tilted" else "fr3_walking_xyz")
+            base = scenario(others.get(name, "fr3_walking_xyz"))
             assert chosen.has_frames_of(base.model_copy(update={"frames": chosen.frames}))
-            assert RENDERED_AS[name] == ("fault_tilted" if name == "fault_tilted" else "fault_missed")
+            assert RENDERED_AS[name] == (name if name in others else "fault_missed")
+        else:
+            assert RENDERED_AS[name] == name
     frames = [
         build_simulator(with_overrides(scenario(n), SMALL), "numba", 1).frame(100)
         for n in ("fault_split", "fr3_walking_xyz")
