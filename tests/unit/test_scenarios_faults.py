@@ -249,6 +249,8 @@ def test_a_pair_of_one_class_that_touches_becomes_one() -> None:
     assert one.names == ("1",)
     assert one.detections.boxes_px.tolist() == [[10, 20, 59, 110]]
     assert np.array_equal(one.detections.masks[0], touching.detections.masks.any(axis=0))
+    turned = merged(found_in(truth_of(("person", near), ("person", LEFT))), MergedSpec(probability=1.0), dice(0))
+    assert turned.detections.boxes_px.tolist() == [[10, 20, 59, 110]]
     for others in ((("person", LEFT), ("person", apart)), (("person", LEFT), ("chair", chair))):
         two = found_in(truth_of(*others))
         assert merged(two, MergedSpec(probability=1.0), dice(0)) is two
@@ -374,11 +376,11 @@ def test_a_false_positive_lies_on_what_stands_still_and_at_one_point_of_the_worl
     assert np.mean(moved) == pytest.approx(-133.85 * step_m / WALL_M, abs=0.15)
 
 
-def test_false_positives_of_a_frame_do_not_depend_on_what_was_found() -> None:
-    spec, seen = FalsePositivesSpec(per_frame=20.0, frames=1), []
-    for found in (found_in(truth_of(*THREE)), found_in(truth_of(*THREE)).keep([False] * 3)):
-        past = [Shown(frame_index=7, truth=truth_of(*THREE))]
-        answer = false_positives(found, spec, past, 0, build_frame(0).intrinsics)
+def test_false_positives_depend_neither_on_what_was_found_nor_on_frames_before_their_time() -> None:
+    spec, seen, truth = FalsePositivesSpec(per_frame=20.0, frames=2), [], truth_of(*THREE)
+    past = [Shown(frame_index=index, truth=truth) for index in (5, 6, 7)]
+    for found, remembered in ((found_in(truth), past), (found_in(truth).keep([False] * 3), past[1:])):
+        answer = false_positives(found, spec, remembered, 0, build_frame(0).intrinsics)
         seen.append(answer.detections.select(range(len(found.names), len(answer.names))))
     assert len(seen[0]) > 5
     assert same(*seen)
