@@ -42,7 +42,8 @@ def lines(names: list[str]) -> list[tuple[str, Scenario]]:
     """What is run, with its label: each scenario, and the same frames without a fault before the first with them."""
     found: list[tuple[str, Scenario]] = []
     firsts: set[str] = set()
-    for name in names:
+    order = list(SCENARIOS)
+    for name in sorted(names, key=lambda name: order.index(RENDERED_AS[name])):
         first = RENDERED_AS[name]
         if first not in firsts:
             firsts.add(first)
