@@ -23,6 +23,7 @@ from dotmask.slam.embedded import EmbeddedSlam
 from dotmask.tum import format_trajectory
 from scenarios.bridge import rgbd_frame_from_sim
 from scenarios.errors import ScenarioError, unknown
+from scenarios.faults.chain import Faults
 from scenarios.judge import Judge
 from scenarios.oracle import OracleSegmenter
 from scenarios.report import Report, WorldTimes
@@ -165,7 +166,7 @@ def run(scenario: Scenario, settings: RunSettings, out: Path, advance: Callable[
     with RunFolder(out) as folder, one_opencv_thread(), ThreadPoolExecutor(len(settings.methods)) as pool:
         folder.write("scenario.json", scenario.to_json())
         simulator = build_simulator(scenario, settings.renderer, settings.threads)
-        oracle = OracleSegmenter()
+        oracle = OracleSegmenter(Faults(scenario))
         loops: dict[str, ClosedLoop] = {}
         judges = {name: Judge(name) for name in settings.methods}
         digest, render_seconds = hashlib.sha256(), 0.0
