@@ -295,7 +295,7 @@ def attribute(
 
     dotmask attribute fr3_walking_xyz --set camera.speed=2 --pose-feedback previous --out runs/blame
     """
-    from scenarios.attribution.report import blame_table, figures_table
+    from scenarios.attribution.report import blame_table, figures_table, headline
     from scenarios.attribution.run import attribute as attribute_scenario
     from scenarios.attribution.variants import VARIANTS
     from scenarios.run import RunSettings, default_out
@@ -317,6 +317,7 @@ def attribute(
     if as_json:
         typer.echo(attribution.to_json(), nl=False)
         return
+    _console().print(headline(attribution), highlight=False)
     _console().print(figures_table(attribution))
     _console().print(blame_table(attribution))
     _console().print(f"frame hash {attribution.frame_hash[:16]}, results in {folder}", highlight=False)
@@ -347,7 +348,7 @@ def counterfactual(
 
     dotmask counterfactual crowd --frames 300 --out runs/crowd-triplet
     """
-    from scenarios.counterfactual import WORLDS, ate_table, costs_table, run_triplet
+    from scenarios.counterfactual import WORLDS, ate_table, costs_table, false_alarms, headline, run_triplet
     from scenarios.run import RunSettings, default_out
 
     scenario = _resolve(name, source, overrides, seed, frames)
@@ -362,9 +363,10 @@ def counterfactual(
     if as_json:
         typer.echo(triplet.to_json(), nl=False)
         return
+    _console().print(headline(triplet), highlight=False)
     _console().print(ate_table(triplet))
     _console().print(costs_table(triplet))
-    _console().print(f"results in {folder}", highlight=False)
+    _console().print(f"{false_alarms(triplet)}; results in {folder}", highlight=False)
 
 
 @app.command()

@@ -147,13 +147,17 @@ def _number(value: float | None, scale: float, sign: str = "") -> str:
     return "-" if value is None else f"{round(value * scale, 2) + 0.0:{sign}.2f}"
 
 
+def headline(triplet: Triplet) -> str:
+    """What was run, in one line."""
+    return (
+        f"{triplet.scenario}, seed {triplet.seed}, {triplet.frames} frames: segmenter {triplet.segmenter}, "
+        f"SLAM {triplet.slam}, profile {triplet.profile}, pose feedback {triplet.pose_feedback}"
+    )
+
+
 def ate_table(triplet: Triplet) -> Table:
     """The absolute trajectory errors: a row a world, a column a method."""
-    title = (
-        f"{triplet.scenario}, seed {triplet.seed}, {triplet.frames} frames: segmenter {triplet.segmenter}, "
-        f"SLAM {triplet.slam}, profile {triplet.profile}"
-    )
-    drawn = Table(title=title, title_justify="left", box=SIMPLE, padding=(0, 1, 0, 0), pad_edge=False)
+    drawn = Table(box=SIMPLE, padding=(0, 1, 0, 0), pad_edge=False)
     drawn.add_column("ATE, mm", no_wrap=True)
     for name in METHODS:
         drawn.add_column(name, justify="right", no_wrap=True)
@@ -179,9 +183,12 @@ def costs_table(triplet: Triplet) -> Table:
         ("the method, without people", "empty: dotmask - unmasked", costs.method_empty_m),
     ):
         drawn.add_row(what, how, _number(value, 1e3, "+"))
-    drawn.caption = (
-        f"Frozen world: {_number(triplet.flagged_frozen, 100)} % of the tracked objects called moving, "
+    return drawn
+
+
+def false_alarms(triplet: Triplet) -> str:
+    """What the method did in the frozen world, where every alarm is false, in one line."""
+    return (
+        f"frozen world: {_number(triplet.flagged_frozen, 100)} % of the tracked objects called moving, "
         f"{_number(triplet.waste_frozen, 100)} % of the pixels lost"
     )
-    drawn.caption_justify = "left"
-    return drawn

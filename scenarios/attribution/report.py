@@ -43,8 +43,8 @@ class Blame(Part):
     """What one stage is to blame for; positive = it does harm.
 
     Attributes:
-        gain: baseline less the variant in which this stage alone is true: what repairing it alone gains.
-        cost: the variant in which all but this stage are true less the one in which all are: what its errors alone cost.
+        gain: baseline, less this stage alone true: what repairing it alone gains.
+        cost: all but this stage true, less all true: what its errors alone cost.
     """
 
     gain: Figures
@@ -126,14 +126,18 @@ def _cells(figures: Figures, sign: str) -> tuple[str, str, str]:
     return text(figures.ate_rmse_m, 1e3, 2), text(figures.moc_error, 1e2, 2), text(figures.leak, 1e2, 2)
 
 
-def figures_table(attribution: Attribution) -> Table:
-    """The figures with nothing and with everything replaced, and what lies between."""
-    title = (
+def headline(attribution: Attribution) -> str:
+    """What was run, in one line."""
+    return (
         f"{attribution.scenario}, seed {attribution.seed}, {attribution.frames} frames: segmenter "
         f"{attribution.segmenter}, SLAM {attribution.slam}, profile {attribution.profile}, pose feedback "
         f"{attribution.pose_feedback}"
     )
-    drawn = Table(title=title, title_justify="left", box=SIMPLE, padding=(0, 1, 0, 0), pad_edge=False)
+
+
+def figures_table(attribution: Attribution) -> Table:
+    """The figures with nothing and with everything replaced, and what lies between."""
+    drawn = Table(box=SIMPLE, padding=(0, 1, 0, 0), pad_edge=False)
     drawn.add_column("", no_wrap=True)
     for heading in ("ATE\nmm", "MOC error\n%", "leak\n%"):
         drawn.add_column(heading, justify="right", no_wrap=True)
@@ -144,11 +148,10 @@ def figures_table(attribution: Attribution) -> Table:
 
 
 def blame_table(attribution: Attribution) -> Table:
-    """A row a stage: what repairing it alone gains, and what its errors alone cost."""
-    title = "Blame: what repairing a stage alone gains, and what its errors alone cost when all others are true"
-    drawn = Table(title=title, title_justify="left", box=SIMPLE, padding=(0, 1, 0, 0), pad_edge=False)
+    """A row a stage: what repairing it alone gains, and what its errors alone cost when all others are true."""
+    drawn = Table(box=SIMPLE, padding=(0, 1, 0, 0), pad_edge=False)
     drawn.add_column("stage", no_wrap=True)
-    for kind in ("gains", "cost"):
+    for kind in ("repair gains", "errors cost"):
         for heading in ("ATE mm", "MOC %", "leak %"):
             drawn.add_column(f"{kind}\n{heading}", justify="right", no_wrap=True)
     for stage, blame in attribution.blame.items():

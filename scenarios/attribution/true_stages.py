@@ -27,13 +27,13 @@ class Noted:
     def step(self, frame: RgbdFrame, T_world_camera: FloatArray) -> FrontEndResult:
         """See FrontEnd."""
         result = self._front_end.step(frame, T_world_camera)
-        self._witness.note(result.tracks)
+        self._witness.note(result)
         return result
 
     def refine(self, T_world_camera: FloatArray) -> FrontEndResult:
         """See FrontEnd."""
         result = self._front_end.refine(T_world_camera)
-        self._witness.note(result.tracks)
+        self._witness.note(result)
         return result
 
 

@@ -1,10 +1,12 @@
 """What the replaced stages may ask: the truth of this frame, and who is who."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
+
+import numpy as np
 
 from dotmask.evaluation.tracking import match_detections
 from dotmask.interfaces import Segmenter
+from dotmask.pipeline import FrontEndResult
 from dotmask.profiles import Profile
 from dotmask.records import Detections, RgbdFrame, Track
 from dotmask.segmentation.selection import select_detections
@@ -57,9 +59,16 @@ class Witness:
             raise RuntimeError(f"witness: asked for frame {frame.index}, but was shown {self._sighting.frame_index}")
         return self._sighting.detections
 
-    def note(self, tracks: Iterable[Track]) -> None:
-        """Remember which instance each track follows, from the detections that they were updated with."""
-        for track in tracks:
+    def note(self, result: FrontEndResult) -> None:
+        """Remember which instance each track follows, from the detections that they were updated with.
+
+        Raises:
+            RuntimeError: the front end did not keep the order of the detections, so nobody knows who is who.
+        """
+        shown = self._sighting.detections
+        if result.detections is None or not np.array_equal(result.detections.boxes_px, shown.boxes_px):
+            raise RuntimeError("witness: the front end has other detections than were shown")
+        for track in result.tracks:
             if track.detection_index is not None:
                 self._followed[track.track_id] = self.instance_of_detection(track.detection_index)
 
