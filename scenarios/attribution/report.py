@@ -151,7 +151,7 @@ def blame_table(attribution: Attribution) -> Table:
     """A row a stage: what repairing it alone gains, and what its errors alone cost when all others are true."""
     drawn = Table(box=SIMPLE, padding=(0, 1, 0, 0), pad_edge=False)
     drawn.add_column("stage", no_wrap=True)
-    for kind in ("repair gains", "errors cost"):
+    for kind in ("gain", "cost"):
         for heading in ("ATE mm", "MOC %", "leak %"):
             drawn.add_column(f"{kind}\n{heading}", justify="right", no_wrap=True)
     for stage, blame in attribution.blame.items():

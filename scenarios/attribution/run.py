@@ -136,7 +136,7 @@ def attribute(scenario: Scenario, settings: RunSettings, out: Path, advance: Cal
         )
         draw_scatters(
             folder.path / "error_against_leak.png",
-            f"{scenario.name}, seed {scenario.seed}, profile {settings.profile}",
+            f"{scenario.name}, seed {scenario.seed}, {len(simulator)} frames, profile {settings.profile}",
             "leaked pixels in the frame",
             "error of the motion from the frame before, mm",
             [_panel(title, by_name[name].steps) for name, title in zip(ends, END_TITLES, strict=True)],
