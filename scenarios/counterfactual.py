@@ -1,6 +1,5 @@
 """Counterfactual triplets: a scenario as it is, with everything frozen, and without people, and what each costs."""
 
-import csv
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Literal
@@ -48,7 +47,7 @@ class Triplet(Part):
     Attributes:
         ate_rmse_m: absolute trajectory error by world and method.
         costs: see Costs.
-        flagged_frozen: share of the tracked objects of interest, over all frames of the frozen world, that the method
+        flagged_frozen: share of the seen objects of interest, over all frames of the frozen world, that the method
             calls moving: all of them wrongly. Null when none was seen.
         waste_frozen: share of the static pixels that odometry lost to the method in the frozen world.
         frame_hashes: by world.
@@ -98,6 +97,7 @@ def run_triplet(scenario: Scenario, settings: RunSettings, out: Path, advance: C
             world: {name: method.ate_rmse_m for name, method in report.methods.items()}
             for world, report in reports.items()
         }
+        frozen = reports["frozen"].methods["dotmask"]
         triplet = Triplet(
             scenario=scenario.name,
             seed=scenario.seed,
@@ -108,8 +108,8 @@ def run_triplet(scenario: Scenario, settings: RunSettings, out: Path, advance: C
             pose_feedback=settings.pose_feedback,
             ate_rmse_m=ate,
             costs=compare(ate),
-            flagged_frozen=_flagged_share(folder.path / "frozen" / "tracks.csv"),
-            waste_frozen=reports["frozen"].methods["dotmask"].masks.waste,
+            flagged_frozen=frozen.moc.idle_flag_rate,
+            waste_frozen=frozen.masks.waste,
             frame_hashes={world: report.frame_hash for world, report in reports.items()},
         )
         folder.write("counterfactual.json", triplet.to_json())
@@ -132,15 +132,6 @@ def compare(ate_rmse_m: Mapping[World, Mapping[str, float | None]]) -> Costs:
         method_empty_m=less(("empty", "dotmask"), ("empty", "unmasked")),
         method_moving_m=less(("moving", "dotmask"), ("empty", "unmasked")),
     )
-
-
-def _flagged_share(tracks_csv: Path) -> float | None:
-    """Share of the rows about a true object that say "moving"; None without such rows."""
-    if not tracks_csv.exists():
-        return None
-    with tracks_csv.open(newline="", encoding="utf-8") as file:
-        flags = [int(row["is_moving"]) for row in csv.DictReader(file) if row["instance_id"]]
-    return sum(flags) / len(flags) if flags else None
 
 
 def _number(value: float | None, scale: float, sign: str = "") -> str:
@@ -189,6 +180,6 @@ def costs_table(triplet: Triplet) -> Table:
 def false_alarms(triplet: Triplet) -> str:
     """What the method did in the frozen world, where every alarm is false, in one line."""
     return (
-        f"frozen world: {_number(triplet.flagged_frozen, 100)} % of the tracked objects called moving, "
+        f"frozen world: {_number(triplet.flagged_frozen, 100)} % of the objects called moving, "
         f"{_number(triplet.waste_frozen, 100)} % of the pixels lost"
     )

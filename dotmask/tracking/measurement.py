@@ -7,10 +7,16 @@ import numpy as np
 import numpy.typing as npt
 
 from dotmask.geometry import back_project
-from dotmask.profiles import ClassModel, Profile
+from dotmask.profiles import Profile
 from dotmask.records import DepthImage, Detections, FloatArray, Intrinsics, MaskImage, Observation, RgbdFrame
 from dotmask.tracking.measurement_model import CAMERA_POINT, PixelDepth
-from dotmask.tracking.measurement_noise import measurement_covariance
+from dotmask.tracking.measurement_noise import (
+    box_centre_variance,
+    centroid_variance,
+    mean_depth_variance,
+    measurement_covariance,
+    median_depth_variance,
+)
 
 _BAND_PX = 8
 """How far outside a box an occluder is looked for: past the ring without depth that sensors leave at depth edges."""
@@ -22,8 +28,6 @@ _MEDIAN_PIXELS = 3000
 _LEAST_DEPTH_M, _MOST_DEPTH_M = 1e-6, 1e6
 _OTHER_MARGIN_M = 0.02
 """How much nearer another detection must be to count as an occluder."""
-_LEAST_MISSING = 0.1
-"""A hidden side always widens R by at least this share of the object's extent."""
 
 
 class _Crop(NamedTuple):
@@ -50,37 +54,39 @@ def observe(detections: Detections, frame: RgbdFrame, profile: Profile) -> tuple
     detection with fewer than `profile.min_depth_pixels` pixels of valid depth gives no observation.
     """
     observations = []
-    labels = _label(detections, frame.intrinsics) if profile.noise.inflates_hidden_sides else None
+    labels = _label(detections, frame.intrinsics) if profile.noise.notices_hidden_sides else None
     model = PixelDepth(intrinsics=frame.intrinsics) if profile.measurement == "pixel_depth" else CAMERA_POINT
     for index, class_name in enumerate(detections.class_names):
         box = detections.boxes_px[index]
         crop = _crop(box, frame.intrinsics)
         mask, depth_m = detections.masks[index][crop.slices], frame.depth_m[crop.slices]
-        depth = _depth(mask, depth_m, profile)
-        if depth is None:
+        depth_seen = _depth(mask, depth_m, profile)
+        if depth_seen is None:
             continue
-        centre = 0.5 * (box[:2] + box[2:])
-        if profile.measurement == "mask_centroid":
-            moments = cv2.moments(mask.view(np.uint8), binaryImage=True)
-            centre = np.array(
-                [crop.u_start + moments["m10"] / moments["m00"], crop.v_start + moments["m01"] / moments["m00"]]
-            )
+        centre, centre_variance = _centre(mask, box, crop, profile)
+        depth, depth_variance = depth_seen
         p_camera = back_project(centre[None], np.array([depth]), frame.intrinsics)[0]
         class_model = profile.class_model(class_name)
-        missing = (0.0, 0.0)
+        is_partial = False
         if labels is not None:
             view = _View(index + 1, labels, frame.depth_m, profile.noise.occluder_margin_m + 0.02 * depth**2)
-            missing = _missing_extent(view, box, crop, depth, class_model, frame.intrinsics)
+            is_partial = _is_partial(view, crop, frame.intrinsics)
         observations.append(
             Observation(
                 position_camera=p_camera,
                 covariance=measurement_covariance(
-                    p_camera, missing, model, class_model, frame.intrinsics, profile.noise
+                    p_camera,
+                    np.array([*centre_variance, depth_variance]),
+                    model,
+                    class_model,
+                    frame.intrinsics,
+                    profile.noise,
                 ),
                 class_name=class_name,
                 detection_index=index,
+                mask=detections.masks[index],
                 model=model,
-                is_partial=missing != (0.0, 0.0),
+                is_partial=is_partial,
             )
         )
     return tuple(observations)
@@ -96,10 +102,20 @@ def _crop(box_px: FloatArray, intrinsics: Intrinsics) -> _Crop:
     )
 
 
-def _depth(mask: MaskImage, depth_m: DepthImage, profile: Profile) -> float | None:
+def _centre(mask: MaskImage, box_px: FloatArray, crop: _Crop, profile: Profile) -> tuple[FloatArray, FloatArray]:
+    """(2,) u and v of the box's centre or of the mask's centroid, pixels, and their variances (2,)."""
+    if profile.measurement != "mask_centroid":
+        return 0.5 * (box_px[:2] + box_px[2:]), box_centre_variance(profile.noise)
+    moments = cv2.moments(mask.view(np.uint8), binaryImage=True)
+    area = moments["m00"]
+    centroid = np.array([moments["m10"] / area, moments["m01"] / area])
+    return np.add(centroid, (crop.u_start, crop.v_start)), centroid_variance(mask, centroid, area, profile.noise)
+
+
+def _depth(mask: MaskImage, depth_m: DepthImage, profile: Profile) -> tuple[float, float] | None:
     """Mean (of a mask's centroid: median) of the depths under the mask, without what is far from their median.
 
-    None with too few pixels.
+    Together with its variance, m and m²; None with too few pixels.
     """
     nearest, farthest = _LEAST_DEPTH_M, _MOST_DEPTH_M
     median = None
@@ -112,10 +128,14 @@ def _depth(mask: MaskImage, depth_m: DepthImage, profile: Profile) -> float | No
             median = float(np.partition(depths, len(depths) // 2)[len(depths) // 2])
     if median is not None and profile.depth_trim_m is not None:
         nearest, farthest = max(median - profile.depth_trim_m, _LEAST_DEPTH_M), median + profile.depth_trim_m
-    is_used = cv2.bitwise_and(cv2.inRange(depth_m, nearest, farthest), mask.view(np.uint8))
-    if cv2.countNonZero(is_used) < profile.min_depth_pixels:
+    is_used = np.asarray(cv2.bitwise_and(cv2.inRange(depth_m, nearest, farthest), mask.view(np.uint8)), np.uint8)
+    pixels = cv2.countNonZero(is_used)
+    if pixels < profile.min_depth_pixels:
         return None
-    return median if profile.measurement == "mask_centroid" else float(cv2.mean(depth_m, is_used)[0])
+    if median is not None and profile.measurement == "mask_centroid":
+        return median, median_depth_variance(median, len(depths), profile.noise)
+    mean = float(cv2.mean(depth_m, is_used)[0])
+    return mean, mean_depth_variance(mean, depth_m, is_used, pixels, profile.noise)
 
 
 class _View(NamedTuple):
@@ -146,38 +166,20 @@ def _label(detections: Detections, intrinsics: Intrinsics) -> npt.NDArray[np.uin
     return labels
 
 
-def _missing_extent(
-    view: _View, box_px: FloatArray, crop: _Crop, distance_m: float, model: ClassModel, intrinsics: Intrinsics
-) -> tuple[float, float]:
-    """Width and height (m) that hidden sides may hide: the class's extent less what is seen; 0 where none is hidden."""
+def _is_partial(view: _View, crop: _Crop, intrinsics: Intrinsics) -> bool:
+    """Whether the image border, or something nearer, hides a side of the object."""
     u0, u1, v0, v1 = crop
+    if u0 <= 1 or v0 <= 1 or u1 >= intrinsics.width - 1 or v1 >= intrinsics.height - 1:
+        return True
     rows, columns = slice(v0, v1, 1 + (v1 - v0) // _LINES), slice(u0, u1, 1 + (u1 - u0) // _LINES)
-    low_u, high_u = slice(max(u0 - _BAND_PX, 0), u0 + _RIM_PX), slice(max(u1 - _RIM_PX, 0), u1 + _BAND_PX)
-    low_v, high_v = slice(max(v0 - _BAND_PX, 0), v0 + _RIM_PX), slice(max(v1 - _RIM_PX, 0), v1 + _BAND_PX)
-    is_hidden_u = (
-        u0 <= 1
-        or u1 >= intrinsics.width - 1
-        or _ends_behind_occluder(view, (rows, low_u), across_columns=True, is_high=False)
-        or _ends_behind_occluder(view, (rows, high_u), across_columns=True, is_high=True)
+    left, right = slice(max(u0 - _BAND_PX, 0), u0 + _RIM_PX), slice(u1 - _RIM_PX, u1 + _BAND_PX)
+    top, bottom = slice(max(v0 - _BAND_PX, 0), v0 + _RIM_PX), slice(v1 - _RIM_PX, v1 + _BAND_PX)
+    return (
+        _ends_behind_occluder(view, (rows, left), across_columns=True, is_high=False)
+        or _ends_behind_occluder(view, (rows, right), across_columns=True, is_high=True)
+        or _ends_behind_occluder(view, (top, columns), across_columns=False, is_high=False)
+        or _ends_behind_occluder(view, (bottom, columns), across_columns=False, is_high=True)
     )
-    is_hidden_v = (
-        v0 <= 1
-        or v1 >= intrinsics.height - 1
-        or _ends_behind_occluder(view, (low_v, columns), across_columns=False, is_high=False)
-        or _ends_behind_occluder(view, (high_v, columns), across_columns=False, is_high=True)
-    )
-    seen = (
-        float(box_px[2] - box_px[0] + 1) * distance_m / intrinsics.fx,
-        float(box_px[3] - box_px[1] + 1) * distance_m / intrinsics.fy,
-    )
-    if not (is_hidden_u or is_hidden_v):
-        return 0.0, 0.0
-    # What hides the left of a person may hide the head as well, though the box ends at the shoulder by itself.
-    width, height = (
-        max(extent - s, _LEAST_MISSING * extent if is_hidden else 0.0)
-        for extent, s, is_hidden in zip(model.extent_m, seen, (is_hidden_u, is_hidden_v), strict=False)
-    )
-    return width, height
 
 
 def _ends_behind_occluder(view: _View, strip: tuple[slice, slice], *, across_columns: bool, is_high: bool) -> bool:

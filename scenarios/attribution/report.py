@@ -102,6 +102,18 @@ class Attribution(Part):
         return self.model_dump_json(indent=2, by_alias=True) + "\n"
 
 
+def figures_of(report: MethodReport) -> Figures:
+    """The figures that blame is measured in, of one variant."""
+    counts = (report.moc.by_class or {}).values()
+    wrong = sum(count.false_positive + count.false_negative for count in counts)
+    answers = wrong + sum(count.true_positive + count.true_negative for count in counts)
+    return Figures(
+        ate_rmse_m=report.ate_rmse_m,
+        moc_error=wrong / answers if answers else None,
+        leak=report.masks.leak,
+    )
+
+
 def blame_stages(figures: Mapping[str, Figures]) -> dict[str, Blame]:
     """The blame of every stage from the figures of all variants, by their names."""
     return {

@@ -13,7 +13,7 @@ import numpy as np
 from dotmask.pipeline import FrameResult
 from dotmask.profiles import profile as get_profile
 from dotmask.records import FloatArray, RgbdFrame
-from scenarios.attribution.report import Attribution, Figures, add_up, blame_stages
+from scenarios.attribution.report import Attribution, add_up, blame_stages, figures_of
 from scenarios.attribution.steps import Step, StepMeter, correlate
 from scenarios.attribution.true_stages import build_front_end
 from scenarios.attribution.variants import ALL_TRUE, BASELINE, VARIANTS, Variant
@@ -22,7 +22,6 @@ from scenarios.bridge import rgbd_frame_from_sim
 from scenarios.judge import Judge
 from scenarios.oracle import OracleSegmenter
 from scenarios.plots import Scatter, draw_scatters
-from scenarios.report import MethodReport
 from scenarios.run import RunSettings, closed_loop, one_opencv_thread, rendered_ahead
 from scenarios.run_folder import RunFolder, versions
 from scenarios.spec import Scenario
@@ -45,34 +44,17 @@ class VariantRun:
         self.judge = Judge(variant.name)
         self._meter = StepMeter()
         self.steps: list[Step] = []
-        self._answers = self._wrong = 0
 
     def step(self, frame: RgbdFrame, truth: GroundTruth, sighting: Sighting) -> FrameResult:
         """Process the next frame."""
         self._witness.show(truth, sighting)
         return self._loop.step(frame)
 
-    def see(self, truth: GroundTruth, sighting: Sighting, result: FrameResult, folder: RunFolder) -> None:
+    def see(self, truth: GroundTruth, result: FrameResult, folder: RunFolder) -> None:
         """Measure what came of it and append the rows of the tables."""
         self.judge.see(truth, result, folder)
         self.steps.append(self._meter.see(truth, result))
         folder.append("steps.csv", STEP_COLUMNS, (self.variant.name, *astuple(self.steps[-1])))
-        verdicts = {track.detection_index: track.verdict for track in result.front_end.tracks}
-        moving = {actor.instance_id: actor.is_moving for actor in truth.objects}
-        for index, instance in enumerate(sighting.instances):
-            if instance in moving:
-                verdict = verdicts.get(index)
-                # What has no track is masked by the pipeline, hence answered as moving.
-                self._wrong += moving[instance] is not (verdict is None or verdict.is_moving)
-                self._answers += 1
-
-    def figures(self, report: MethodReport) -> Figures:
-        """The figures that blame is measured in, given all figures of the variant."""
-        return Figures(
-            ate_rmse_m=report.ate_rmse_m,
-            moc_error=self._wrong / self._answers if self._answers else None,
-            leak=report.masks.leak,
-        )
 
 
 def attribute(scenario: Scenario, settings: RunSettings, out: Path, advance: Callable[[], None]) -> Attribution:
@@ -109,12 +91,12 @@ def attribute(scenario: Scenario, settings: RunSettings, out: Path, advance: Cal
             results = pool.map(
                 lambda run, sighting, frame=frame, truth=truth: run.step(frame, truth, sighting), runs, sightings
             )
-            for run, sighting, result in zip(runs, sightings, results, strict=True):
-                run.see(truth, sighting, result, folder)
+            for run, result in zip(runs, results, strict=True):
+                run.see(truth, result, folder)
                 advance()
         by_name = {run.variant.name: run for run in runs}
         reports = {name: run.judge.report() for name, run in by_name.items()}
-        figures = {name: run.figures(reports[name]) for name, run in by_name.items()}
+        figures = {name: figures_of(report) for name, report in reports.items()}
         blame = blame_stages(figures)
         ends = (BASELINE.name, ALL_TRUE.name)
         attribution = Attribution(

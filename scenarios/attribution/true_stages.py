@@ -12,7 +12,17 @@ import numpy as np
 from dotmask.classification import Classify, classify
 from dotmask.pipeline import DotMask, FrontEnd, FrontEndResult
 from dotmask.profiles import Profile
-from dotmask.records import DepthImage, FloatArray, MaskedDepth, Observation, Reason, RgbdFrame, Track, Verdict
+from dotmask.records import (
+    DepthImage,
+    FloatArray,
+    Intrinsics,
+    MaskedDepth,
+    Observation,
+    Reason,
+    RgbdFrame,
+    Track,
+    Verdict,
+)
 from dotmask.tracking.association import Associate, Association, associate
 from scenarios.attribution.variants import Stage
 from scenarios.attribution.witness import Witness
@@ -89,7 +99,11 @@ def true_association(witness: Witness) -> Associate:
     """
 
     def associate_truly(
-        tracks: Sequence[Track], observations: Sequence[Observation], T_world_camera: FloatArray, profile: Profile
+        tracks: Sequence[Track],
+        observations: Sequence[Observation],
+        T_world_camera: FloatArray,
+        intrinsics: Intrinsics,
+        profile: Profile,
     ) -> Association:
         follows = [witness.instance_of_track(track) for track in tracks]
         shows = [witness.instance_of_detection(observation.detection_index) for observation in observations]
@@ -101,7 +115,11 @@ def true_association(witness: Witness) -> Associate:
         false_tracks = [i for i, instance in enumerate(follows) if instance is None]
         false_observations = [j for j, instance in enumerate(shows) if instance is None]
         among_false = associate(
-            [tracks[i] for i in false_tracks], [observations[j] for j in false_observations], T_world_camera, profile
+            [tracks[i] for i in false_tracks],
+            [observations[j] for j in false_observations],
+            T_world_camera,
+            intrinsics,
+            profile,
         )
         pairs += [(false_tracks[i], false_observations[j]) for i, j in among_false.pairs]
         paired_tracks, paired_observations = {i for i, _ in pairs}, {j for _, j in pairs}

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dotmask.evaluation.tracking import match_detections
+from dotmask.evaluation.matching import mask_ious, match_detections
 from dotmask.interfaces import Segmenter
 from dotmask.pipeline import FrontEndResult
 from dotmask.profiles import Profile
@@ -34,7 +34,7 @@ def look(segmenter: Segmenter, frame: RgbdFrame, truth: GroundTruth, profile: Pr
     return Sighting(
         frame_index=frame.index,
         detections=detections,
-        instances=match_detections(detections.masks, truth.instance_ids),
+        instances=match_detections(mask_ious(detections.masks, truth.instance_ids)),
     )
 
 

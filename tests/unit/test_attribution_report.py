@@ -13,10 +13,12 @@ from scenarios.attribution.report import (
     add_up,
     blame_stages,
     blame_table,
+    figures_of,
     figures_table,
 )
 from scenarios.attribution.steps import Step, StepMeter, correlate
 from scenarios.attribution.variants import STAGES, VARIANTS, Variant
+from scenarios.report import ConfusionReport, MaskReport, MethodReport, MocReport, StageTimes
 from sim.geometry import look_at
 from sim.records import GroundTruth, ObjectTruth
 
@@ -81,6 +83,27 @@ def test_the_tables_show_signs_and_what_was_not_measured() -> None:
     assert rows["pose"] == ["pose", "+4000.00", "+4.00", "-", "+4000.00", "+4.00", "-"]
     assert rows["sum"][1] == "+31000.00"
     assert rows["every stage true"][-3:] == ["1000.00", "0.00", "-"]
+
+
+def of_counts(by_class: dict[str, ConfusionReport] | None) -> Figures:
+    return figures_of(
+        MethodReport(
+            ate_rmse_m=0.5,
+            rpe_trans_rmse_m=None,
+            rpe_rot_rmse_rad=None,
+            tracked_frames=3,
+            moc=MocReport(by_class=by_class),
+            masks=MaskReport(leak=0.25),
+            time_ms=StageTimes(),
+        )
+    )
+
+
+def test_the_error_of_the_classification_is_the_share_of_wrong_verdicts_of_all_classes() -> None:
+    people = ConfusionReport(true_positive=10, false_positive=3, false_negative=2, true_negative=5)
+    chairs = ConfusionReport(true_positive=0, false_positive=1, false_negative=0, true_negative=9)
+    assert of_counts({"person": people, "chair": chairs}) == Figures(ate_rmse_m=0.5, moc_error=6 / 30, leak=0.25)
+    assert of_counts(None).moc_error is None
 
 
 CAMERA = Intrinsics(width=8, height=6, fx=6.0, fy=6.0, cx=3.5, cy=2.5)

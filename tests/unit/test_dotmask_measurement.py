@@ -80,11 +80,13 @@ def test_paper_covariance_is_the_sensors(z) -> None:
 def test_calibrated_covariance_couples_depth_and_sideways_off_the_axis() -> None:
     depth, mask = wall(8.0), rectangle(20, 60, 80, 150)
     depth[mask] = 3.0
-    still = replace(CALIBRATED, noise=replace(CALIBRATED.noise, pose_rotation_sigma_rad=0.0))
-    [seen] = observe(detect(mask), frame(depth), still)
+    rigid = replace(CALIBRATED.class_model("chair"), shape_sigma_m=(0.0, 0.0, 0.0))
+    noise = replace(CALIBRATED.noise, pose_position_sigma_m=0.0, pose_rotation_sigma_rad=0.0)
+    [seen] = observe(detect(mask), frame(depth), replace(CALIBRATED, classes=(rigid,), noise=noise))
     slope = (50 - 159.5) / 260
-    sigma_z = 0.0012 + 0.0019 * 2.6**2
-    assert seen.covariance[0, 2] == pytest.approx(slope * sigma_z**2, rel=1e-4)
+    depth_variance = seen.covariance[2, 2]
+    assert depth_variance > 0
+    assert seen.covariance[0, 2] == pytest.approx(slope * depth_variance, rel=1e-6)
 
 
 def test_an_uncertain_turn_of_the_camera_moves_a_point_across_its_ray() -> None:

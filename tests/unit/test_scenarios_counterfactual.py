@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.counterfactual import _flagged_share, compare, run_triplet
+from scenarios.counterfactual import compare, run_triplet
 from scenarios.errors import ScenarioError
 from scenarios.registry import scenario
 from scenarios.run import RunSettings
@@ -33,15 +33,6 @@ def test_without_an_error_there_is_no_cost() -> None:
     costs = compare({**ATE, "frozen": {"unmasked": None, "mdi": 0.1, "dotmask": 0.1}})
     assert costs.people_m is costs.motion_m is costs.masking_all_m is costs.method_frozen_m is None
     assert costs.not_masking_m == pytest.approx(0.063)
-
-
-def test_the_flagged_share_counts_true_objects_alone(tmp_path: Path) -> None:
-    path = tmp_path / "tracks.csv"
-    path.write_text("instance_id,is_moving\n1,1\n1,0\n2,0\n2,0\n,1\n")
-    assert _flagged_share(path) == 0.25
-    path.write_text("instance_id,is_moving\n,1\n")
-    assert _flagged_share(path) is None
-    assert _flagged_share(tmp_path / "missing.csv") is None
 
 
 def test_a_scenario_that_is_a_counterfactual_already_is_refused(tmp_path: Path) -> None:

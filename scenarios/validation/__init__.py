@@ -1,0 +1,1 @@
+"""`dotmask validate`: measures whether every stage does what the documents say, and writes docs/validation.md."""
