@@ -209,7 +209,9 @@ def run(
     methods: Annotated[str, typer.Option(help="Comma-separated: unmasked, mdi, dotmask.")] = "unmasked,mdi,dotmask",
     segmenter: Annotated[str, typer.Option(help="Segmenter: oracle.")] = "oracle",
     slam: Annotated[str, typer.Option(help="SLAM back end: embedded.")] = "embedded",
-    profile: Annotated[str, typer.Option(help="Parameters of the method: paper, calibrated.")] = "calibrated",
+    profile: Annotated[
+        str, typer.Option(help="Parameters of the method: paper, calibrated. original: as the authors' program is.")
+    ] = "calibrated",
     pose_feedback: Feedback = None,
     renderer: Renderer = "numba",
     seed: Seed = None,
@@ -374,7 +376,7 @@ def check(
     names: Annotated[
         list[str] | None, typer.Argument(help="Scenarios; `dotmask list` names them.", show_default=False)
     ] = None,
-    everything: Annotated[bool, typer.Option("--all", help="Every scenario.")] = False,
+    everything: Annotated[bool, typer.Option("--all", help="Every scenario that has frames of its own.")] = False,
     frames: Annotated[int, typer.Option(min=1, help="How many frames of each to look at.")] = 3,
     overrides: Overrides = None,
     seed: Seed = None,
@@ -391,11 +393,11 @@ def check(
     dotmask check --all --frames 5
     """
     from scenarios.check.run import check_scenario, findings_json, table
-    from scenarios.registry import SCENARIOS
+    from scenarios.registry import RENDERED_AS
 
     if bool(names) == everything:
         raise ScenarioError("give names of scenarios, or --all, not both")
-    chosen = [_resolve(name, None, overrides, seed, None) for name in names or SCENARIOS]
+    chosen = [_resolve(name, None, overrides, seed, None) for name in names or dict.fromkeys(RENDERED_AS.values())]
     findings = []
     with _progress() as progress:
         task = progress.add_task("check", total=frames * len(chosen))

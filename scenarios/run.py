@@ -14,14 +14,16 @@ from typing import cast, get_args
 import cv2
 
 from dotmask.interfaces import Segmenter
+from dotmask.original import OriginalDotMask
 from dotmask.pipeline import ClosedLoop, DotMask, FrontEnd, MaskAll, Unmasked
-from dotmask.profiles import PoseFeedback, Profile
+from dotmask.profiles import ORIGINAL, PoseFeedback, Profile
 from dotmask.profiles import profile as get_profile
 from dotmask.records import FloatArray, RgbdFrame
 from dotmask.slam.embedded import EmbeddedSlam
 from dotmask.tum import format_trajectory
 from scenarios.bridge import rgbd_frame_from_sim
 from scenarios.errors import ScenarioError, unknown
+from scenarios.faults.chain import Faults
 from scenarios.judge import Judge
 from scenarios.oracle import OracleSegmenter
 from scenarios.report import Report, WorldTimes
@@ -32,10 +34,16 @@ from scenarios.world import RENDERERS, build_simulator
 from sim.records import SimFrame
 from sim.simulator import Simulator
 
+
+def _method(segmenter: Segmenter, chosen: Profile) -> FrontEnd:
+    """The method; the profile `original` is another program."""
+    return OriginalDotMask(segmenter) if chosen is ORIGINAL else DotMask(segmenter, chosen)
+
+
 METHODS: dict[str, Callable[[Segmenter, Profile], FrontEnd]] = {
     "unmasked": lambda segmenter, chosen: Unmasked(),
     "mdi": MaskAll,
-    "dotmask": DotMask,
+    "dotmask": _method,
 }
 """What may be compared: raw depth to both, all objects of interest removed from both, the method."""
 
@@ -158,7 +166,7 @@ def run(scenario: Scenario, settings: RunSettings, out: Path, advance: Callable[
     with RunFolder(out) as folder, one_opencv_thread(), ThreadPoolExecutor(len(settings.methods)) as pool:
         folder.write("scenario.json", scenario.to_json())
         simulator = build_simulator(scenario, settings.renderer, settings.threads)
-        oracle = OracleSegmenter()
+        oracle = OracleSegmenter(Faults(scenario))
         loops: dict[str, ClosedLoop] = {}
         judges = {name: Judge(name) for name in settings.methods}
         digest, render_seconds = hashlib.sha256(), 0.0

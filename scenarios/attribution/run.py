@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from dotmask.pipeline import FrameResult
+from dotmask.profiles import ORIGINAL
 from dotmask.profiles import profile as get_profile
 from dotmask.records import FloatArray, RgbdFrame
 from scenarios.attribution.report import Attribution, add_up, blame_stages, figures_of
@@ -19,6 +20,8 @@ from scenarios.attribution.true_stages import build_front_end
 from scenarios.attribution.variants import ALL_TRUE, BASELINE, VARIANTS, Variant
 from scenarios.attribution.witness import Sighting, Witness, look
 from scenarios.bridge import rgbd_frame_from_sim
+from scenarios.errors import ScenarioError
+from scenarios.faults.chain import Faults
 from scenarios.judge import Judge
 from scenarios.oracle import OracleSegmenter
 from scenarios.plots import Scatter, draw_scatters
@@ -70,10 +73,12 @@ def attribute(scenario: Scenario, settings: RunSettings, out: Path, advance: Cal
         ScenarioError, SimError, DotmaskError: bad input; nothing is left in `out`.
     """
     profile = get_profile(settings.profile)
+    if profile is ORIGINAL:
+        raise ScenarioError("attribute: the profile original is another program without these stages; choose another")
     with RunFolder(out) as folder, one_opencv_thread(), ThreadPoolExecutor(os.cpu_count()) as pool:
         folder.write("scenario.json", scenario.to_json())
         simulator = build_simulator(scenario, settings.renderer, settings.threads)
-        segmenter, exact = OracleSegmenter(), OracleSegmenter()
+        segmenter, exact = OracleSegmenter(Faults(scenario)), OracleSegmenter()
         runs: tuple[VariantRun, ...] = ()
         digest = hashlib.sha256()
         for timed in rendered_ahead(simulator):

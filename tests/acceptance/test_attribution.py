@@ -124,6 +124,7 @@ def test_a_triplet_compares_runs_with_the_same_camera(folder: Path, report: Repo
 BAD_INPUT = [
     (["attribute", "smok"], "Did you mean smoke?"),
     (["attribute", "smoke", "--profile", "papr"], "paper"),
+    (["attribute", "smoke", "--profile", "original"], "without these stages"),
     (["attribute", "smoke", "--segmenter", "orcale"], "Did you mean oracle?"),
     (["attribute"], "give the name of a scenario, or --from"),
     (["counterfactual", "smoke", "--set", "variant=frozen"], "leave variant=frozen out"),
