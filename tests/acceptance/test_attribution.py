@@ -121,6 +121,25 @@ def test_a_triplet_compares_runs_with_the_same_camera(folder: Path, report: Repo
     assert len(paths) == 1, "the camera is the same in every world"
 
 
+def test_a_segmenter_that_misses_people_is_to_blame_for_the_leak(tmp_path: Path, dotmask) -> None:
+    done = dotmask(
+        "attribute",
+        "smoke",
+        "--frames",
+        12,
+        "--set",
+        "faults.missed.probability=0.5",
+        "--json",
+        "--out",
+        tmp_path / "a",
+    )
+    found = Attribution.model_validate_json(done.out)
+    others = [blame.cost.leak for stage, blame in found.blame.items() if stage != "masks"]
+    assert found.blame["masks"].cost.leak > 0.05
+    assert found.blame["masks"].cost.leak > 10 * max(others)
+    assert found.figures["true_masks"].leak < found.figures["baseline"].leak
+
+
 BAD_INPUT = [
     (["attribute", "smok"], "Did you mean smoke?"),
     (["attribute", "smoke", "--profile", "papr"], "paper"),
