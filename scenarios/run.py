@@ -111,9 +111,9 @@ class RunSettings:
         )
 
 
-def default_out(scenario: Scenario) -> Path:
-    """`runs/NAME-SEED`, or the first free `runs/NAME-SEED-2` and so on."""
-    base = Path("runs") / f"{scenario.name}-{scenario.seed}"
+def default_out(scenario: Scenario, prefix: str = "") -> Path:
+    """`runs/PREFIXNAME-SEED`, or the first free `runs/PREFIXNAME-SEED-2` and so on."""
+    base = Path("runs") / f"{prefix}{scenario.name}-{scenario.seed}"
     number, path = 1, base
     while path.exists():
         number += 1
@@ -182,7 +182,11 @@ def run(scenario: Scenario, settings: RunSettings, out: Path, advance: Callable[
             if not loops:
                 # The first true pose fixes the world of the estimates, as the alignment of a trajectory would.
                 start = sim_frame.truth.T_world_camera
-                loops = {name: _closed_loop(name, settings, oracle, frame, start) for name in settings.methods}
+                chosen = get_profile(settings.profile)
+                loops = {
+                    name: closed_loop(METHODS[name](oracle, chosen), settings, frame, start)
+                    for name in settings.methods
+                }
             # Each method has its own state, so the order in which they are done cannot matter.
             steps = pool.map(lambda loop, now=frame: loop.step(now), loops.values())
             results = dict(zip(loops, steps, strict=True))
@@ -215,12 +219,16 @@ def run(scenario: Scenario, settings: RunSettings, out: Path, advance: Callable[
     return report
 
 
-def _closed_loop(
-    name: str, settings: RunSettings, segmenter: Segmenter, first: RgbdFrame, T_world_camera: FloatArray
-) -> ClosedLoop:
-    front_end = METHODS[name](segmenter, get_profile(settings.profile))
-    slam = EmbeddedSlam(first.intrinsics, T_world_camera)
-    return ClosedLoop(front_end, slam, settings.pose_feedback, T_world_camera)
+def closed_loop(front_end: FrontEnd, settings: RunSettings, first: RgbdFrame, T_world_camera: FloatArray) -> ClosedLoop:
+    """The front end in a loop with the SLAM of the settings.
+
+    Args:
+        front_end: what masks the depth.
+        settings: how the scenario is run.
+        first: the first frame.
+        T_world_camera: (4, 4) its true pose, which fixes the world of the estimates.
+    """
+    return ClosedLoop(front_end, EmbeddedSlam(first.intrinsics, T_world_camera), settings.pose_feedback, T_world_camera)
 
 
 @contextmanager
