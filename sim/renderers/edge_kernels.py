@@ -100,13 +100,12 @@ def inverse_depth_plane(camera, faces, t):
 
 
 @njit(**KERNEL)
-def differ(rgb, first, second):
-    """Whether two pixels (offsets into the flat colours) differ enough to see a step between them."""
-    for c in range(3):
-        difference = np.int64(rgb[first + np.uint64(c)]) - np.int64(rgb[second + np.uint64(c)])
-        if difference > CONTRAST or difference < -CONTRAST:
-            return True
-    return False
+def differ(first, second):
+    """Whether two colours 0x00bbggrr differ enough to see a step between them."""
+    red = np.int64(first & 255) - np.int64(second & 255)
+    green = np.int64((first >> 8) & 255) - np.int64((second >> 8) & 255)
+    blue = np.int64(first >> 16) - np.int64(second >> 16)
+    return max(abs(red), abs(green), abs(blue)) > CONTRAST
 
 
 @njit(**KERNEL)
@@ -154,7 +153,7 @@ def blend_edges(camera, faces, neighbours, fx, fy, cx, cy, triangles, inverse_de
             for x in range(width - 1 + direction):
                 n = np.uint64(y * width + x)
                 s, t = flat_t[n], flat_t[n + step]
-                if s == t or not differ(flat_c, np.uint64(3) * n, np.uint64(3) * (n + step)):
+                if s == t or not differ(flat_c[n], flat_c[n + step]):
                     continue
                 if s >= 0 and (neighbours[s, 0] == t or neighbours[s, 1] == t or neighbours[s, 2] == t):
                     continue
@@ -168,21 +167,25 @@ def blend_edges(camera, faces, neighbours, fx, fy, cx, cy, triangles, inverse_de
                 else:
                     below[x], following[x] = a, b
         if y >= row_first:
-            smooth[y] = rgb[y]
+            for x in range(width):
+                colour = rgb[y, x]
+                smooth[y, x, 0] = colour & 255
+                smooth[y, x, 1] = (colour >> 8) & 255
+                smooth[y, x, 2] = colour >> 16
             for x in range(width):
                 # A slanted edge is met in both directions, with the same area.
                 across, along = left[x] + right[x], above[x] + below[x]
                 if across + along == zero:
                     continue
-                step = 3 if across >= along else 3 * width
+                step = 1 if across >= along else width
                 before, after = (left[x], right[x]) if across >= along else (above[x], below[x])
-                first = 3 * (y * width + x)
-                for n in range(first, first + 3):
-                    own = f32(flat_c[n])
+                n = y * width + x
+                for c in range(3):
+                    own = f32((flat_c[n] >> 8 * c) & 255)
                     value = own
                     if before > zero:
-                        value += before * (f32(flat_c[n - step]) - own)
+                        value += before * (f32((flat_c[n - step] >> 8 * c) & 255) - own)
                     if after > zero:
-                        value += after * (f32(flat_c[n + step]) - own)
-                    target[n] = np.uint8(value + half)
+                        value += after * (f32((flat_c[n + step] >> 8 * c) & 255) - own)
+                    target[3 * n + c] = np.uint8(value + half)
         above, following = following, above

@@ -13,15 +13,9 @@ import numpy as np
 from numba import njit
 
 from sim.renderers.kernels import KERNEL, cross
+from sim.renderers.texture_kernels import BLOCK, COLOUR, GREEN, INTEGER_ROWS, ORIGIN, RED_BLUE, SIDE, look_up
 
 f32 = np.float32
-
-BLOCK = 64
-"""Pixels shaded together. Its scratch rows have a constant distance, so LLVM can prove that they do not overlap and
-vectorise the lighting."""
-
-AREA_MAX = f32(2.0**40)
-"""Texels per pixel beyond every texture."""
 
 SHADOW_NEAR = f32(0.05)
 SHADOW_TANGENT = 2.75
@@ -32,35 +26,6 @@ SHADOW_OFFSET_TEXELS = f32(2.2)
 
 BRIGHTNESS_KNEE = f32(0.7)
 """Brightness above it is compressed and stays below 1: no channel burns out."""
-
-
-FIELDS = 0x0000FF0000FF00FF
-
-
-@njit(**KERNEL)
-def spread(texel):
-    """0x00bbggrr to FIELDS: red, blue and green, each with room for a product with 256."""
-    t = np.int64(texel)
-    return (t | (t << 32)) & FIELDS
-
-
-@njit(**KERNEL)
-def bilinear(texels, level, size, u, v):
-    """Mean of four texels of the mip level that begins at `level`, as three 16-bit fields (r, g, b from below).
-
-    u, v >= 0 are in 1/256 texel and repeat beyond `size`, a power of two.
-    """
-    wrap = size - 1
-    u0, v0 = (u >> 8) & wrap, (v >> 8) & wrap
-    u1, v1 = (u0 + 1) & wrap, (v0 + 1) & wrap
-    top, bottom = level + v0 * size, level + v1 * size
-    weight_u, weight_v = u & 255, v & 255
-    w11 = (weight_u * weight_v) >> 8
-    total = spread(texels[np.uint64(top + u0)]) * (256 - weight_u - weight_v + w11)
-    total += spread(texels[np.uint64(top + u1)]) * (weight_u - w11)
-    total += spread(texels[np.uint64(bottom + u0)]) * (weight_v - w11)
-    total += spread(texels[np.uint64(bottom + u1)]) * w11
-    return (total >> 8) & FIELDS
 
 
 @njit(**KERNEL)
@@ -118,9 +83,9 @@ def shade(
     # Rows of the scratch, by pixel: 0-1 uv, 2 texels per pixel; by lane: 3-5 normal, 6 ray x, 7 z, 8-10 position,
     # 11 brightness, 12 one light's share, 13-14 shadow texel, 15 limit of 1/z in the shadow map.
     s = np.zeros(16 * BLOCK, np.float32)
-    bits = s.view(np.int32)
-    face_of, level_of = np.zeros(BLOCK, np.int32), np.zeros(BLOCK, np.int32)
-    size_of, origin_of = np.zeros(BLOCK, np.int32), np.zeros(BLOCK, np.int32)
+    integer = np.zeros(INTEGER_ROWS * BLOCK, np.int32)
+    colours = integer.view(np.uint32)
+    bright = np.zeros(BLOCK, np.uint32)
     lane_of = np.zeros(BLOCK, np.int64)
     for y in range(row_first, row_last):
         ray_y = (y - cy) * inverse_fy
@@ -131,6 +96,7 @@ def shade(
         for x_first in range(0, width, BLOCK):
             count = min(BLOCK, width - x_first)
             previous, lanes, is_open = -1, 0, False
+            integer[SIDE : SIDE + BLOCK] = 0
             i = j = k = np.uint32(0)
             q1x = q1 = q2x = q2 = density = zero
             side = origin = np.int32(0)
@@ -138,9 +104,7 @@ def shade(
                 x = x_first + n
                 pixel = np.uint64(y * width + x)
                 t = flat_t[pixel]
-                face_of[n] = t
                 if t < 0:
-                    flat_rgb[u3 * pixel] = flat_rgb[u3 * pixel + u1] = flat_rgb[u3 * pixel + u2] = 0
                     flat_depth[pixel] = 0
                     flat_ids[pixel] = 0
                     continue
@@ -175,7 +139,7 @@ def shade(
                 s[n] = attributes[i, 6] * b0 + attributes[j, 6] * b1 + attributes[k, 6] * b2
                 s[BLOCK + n] = attributes[i, 7] * b0 + attributes[j, 7] * b1 + attributes[k, 7] * b2
                 s[2 * BLOCK + n] = density * z * z * z
-                size_of[n], origin_of[n] = side, origin
+                integer[SIDE + n], integer[ORIGIN + n] = side, origin
                 if is_open:
                     is_open = False
                 else:
@@ -259,37 +223,11 @@ def shade(
                     brightness = brightness if brightness < BRIGHTNESS_KNEE else BRIGHTNESS_KNEE
                     s[11 * BLOCK + n] = (brightness + room * over / (over + room)) * f32(256)
 
-            # Mip level: the exponent of 4 in the texels per pixel, and how far it is to the next one.
+            look_up(texels, s, integer)
             for n in range(BLOCK):
-                area = s[2 * BLOCK + n]
-                area = area if area > one else one
-                s[2 * BLOCK + n] = area if area < AREA_MAX else AREA_MAX
-            for n in range(BLOCK):
-                level = (bits[2 * BLOCK + n] - np.int32(127 << 23)) >> np.int32(24)
-                bits[2 * BLOCK + n] -= level << np.int32(24)
-                level_of[n] = level
-            for n in range(BLOCK):
-                s[2 * BLOCK + n] = (np.sqrt(s[2 * BLOCK + n]) - one) * f32(256)
-
+                bright[n] = np.uint32(s[11 * BLOCK + lane_of[n]]) if integer[SIDE + n] > 0 else np.uint32(0)
             for n in range(count):
-                if face_of[n] < 0:
-                    continue
-                full = np.int64(size_of[n])
-                size, blend = full >> level_of[n], np.int64(s[2 * BLOCK + n])
-                if size < 2:
-                    size, blend = 1, 0
-                level = origin_of[n] + (full * full - size * size) // 3 * 4  # the sum of the finer levels
-                u, v = s[n], s[BLOCK + n]
-                # Texel centres lie at half integers of u * size; 8 bits of fraction. size is a power of two, so &
-                # repeats the texture.
-                wide_u = np.int64((u - np.floor(u)) * f32(size << 8)) + (size << 8)
-                wide_v = np.int64((v - np.floor(v)) * f32(size << 8)) + (size << 8)
-                fields = bilinear(texels, level, size, wide_u - 128, wide_v - 128)
-                if blend > 0:  # trilinear
-                    coarse = bilinear(texels, level + size * size, size >> 1, (wide_u >> 1) - 128, (wide_v >> 1) - 128)
-                    fields = ((fields * (256 - blend) + coarse * blend) >> 8) & FIELDS
-                factor = np.int64(s[11 * BLOCK + lane_of[n]])
-                pixel = u3 * np.uint64(y * width + x_first + n)
-                flat_rgb[pixel] = ((fields & 255) * factor) >> 8
-                flat_rgb[pixel + u1] = (((fields >> 40) & 255) * factor) >> 8
-                flat_rgb[pixel + u2] = (((fields >> 16) & 255) * factor) >> 8
+                colour, factor = colours[COLOUR + n], bright[n]
+                red_blue = (np.uint32((colour & RED_BLUE) * factor) >> np.uint32(8)) & RED_BLUE
+                green = (((colour & GREEN) >> np.uint32(8)) * factor) & GREEN
+                flat_rgb[np.uint64(y * width + x_first + n)] = red_blue | green

@@ -148,7 +148,7 @@ class VisibilityBufferRenderer:
             if any(box):
                 parts.append((actor.faces, box[:2], actor.bit if counts else np.uint32(0)))
 
-        raw, rgb = np.empty((height, width, 3), np.uint8), np.empty((height, width, 3), np.uint8)
+        raw, rgb = np.empty((height, width), np.uint32), np.empty((height, width, 3), np.uint8)
 
         def draw(first: int, last: int) -> None:
             self._inverse_depth[first:last] = 0
