@@ -87,7 +87,11 @@ def shade(
     colours = integer.view(np.uint32)
     bright = np.zeros(BLOCK, np.uint32)
     lane_of = np.zeros(BLOCK, np.int64)
+    rays_x = np.zeros(width, np.float32)
+    for x in range(width):
+        rays_x[x] = (x - cx) * inverse_fx
     for y in range(row_first, row_last):
+        row_start = np.uint64(y * width)
         ray_y = (y - cy) * inverse_fy
         ray_y32 = f32(ray_y)
         row_x = T[0, 1] * ray_y32 + T[0, 2]
@@ -98,11 +102,10 @@ def shade(
             previous, lanes, is_open = -1, 0, False
             integer[SIDE : SIDE + BLOCK] = 0
             i = j = k = np.uint32(0)
-            q1x = q1 = q2x = q2 = density = zero
+            q1x = q1 = q2x = q2 = density = u_a = u_b = u_g = v_a = v_b = v_g = zero
             side = origin = np.int32(0)
             for n in range(count):
-                x = x_first + n
-                pixel = np.uint64(y * width + x)
+                pixel = row_start + np.uint64(x_first + n)
                 t = flat_t[pixel]
                 if t < 0:
                     flat_depth[pixel] = 0
@@ -125,19 +128,18 @@ def shade(
                     texture = np.uint32(face_texture[face])
                     side, origin = texture_size[texture], texture_offset[texture]
                     size = np.float64(side)
-                    du1, dv1 = attributes[j, 6] - attributes[i, 6], attributes[j, 7] - attributes[i, 7]
-                    du2, dv2 = attributes[k, 6] - attributes[i, 6], attributes[k, 7] - attributes[i, 7]
-                    uv_area = abs(du1 * dv2 - dv1 * du2)
+                    u_a, u_b, u_g = attributes[i, 6], attributes[j, 6], attributes[k, 6]
+                    v_a, v_b, v_g = attributes[i, 7], attributes[j, 7], attributes[k, 7]
+                    uv_area = abs((u_b - u_a) * (v_g - v_a) - (v_b - v_a) * (u_g - u_a))
                     density = f32(size * size * uv_area * abs(inverse_det) * inverse_focals)
                     identity = face_id[face]
                 flat_ids[pixel] = identity
-                ray_x = f32((x - cx) * inverse_fx)
+                ray_x = rays_x[x_first + n]
                 # Rounding must not leave the triangle: the thinner it is, the farther it would lead.
                 b1 = min(max((q1x * ray_x + q1) * z, zero), one)
                 b2 = min(max((q2x * ray_x + q2) * z, zero), one - b1)
                 b0 = one - b1 - b2
-                s[n] = attributes[i, 6] * b0 + attributes[j, 6] * b1 + attributes[k, 6] * b2
-                s[BLOCK + n] = attributes[i, 7] * b0 + attributes[j, 7] * b1 + attributes[k, 7] * b2
+                s[n], s[BLOCK + n] = u_a * b0 + u_b * b1 + u_g * b2, v_a * b0 + v_b * b1 + v_g * b2
                 s[2 * BLOCK + n] = density * z * z * z
                 integer[SIDE + n], integer[ORIGIN + n] = side, origin
                 if is_open:
@@ -230,4 +232,4 @@ def shade(
                 colour, factor = colours[COLOUR + n], bright[n]
                 red_blue = (np.uint32((colour & RED_BLUE) * factor) >> np.uint32(8)) & RED_BLUE
                 green = (((colour & GREEN) >> np.uint32(8)) * factor) & GREEN
-                flat_rgb[np.uint64(y * width + x_first + n)] = red_blue | green
+                flat_rgb[row_start + np.uint64(x_first + n)] = red_blue | green
