@@ -34,10 +34,9 @@ class VisibilityBufferRenderer:
 
     Args:
         scene: objects that are no actors are posed once, at time 0.
-        camera: intrinsics and size of the images.
+        camera: intrinsics, exposure, and size of the images.
         threads: bands of rows that are drawn at the same time.
         shadow_size: side of each light's shadow map in pixels, 0 = no shadows.
-        exposure_ev: of the camera, in stops: one more makes the image twice as bright, up to the soft limit near white.
 
     Raises:
         ValueError: an argument is out of its range, or an object does not fit its own palette.
@@ -50,7 +49,6 @@ class VisibilityBufferRenderer:
         threads: int = 1,
         *,
         shadow_size: int = 1024,
-        exposure_ev: float = 0.0,
     ) -> None:
         if threads < 1 or shadow_size < 0:
             raise ValueError(f"threads must be at least 1 and shadow_size at least 0, got {threads} and {shadow_size}")
@@ -71,7 +69,7 @@ class VisibilityBufferRenderer:
         self._triangles = np.full(shape, -1, np.int32)
         self._coverage = np.zeros(shape, np.uint32)
         self._rendered = False
-        gain = 2.0**exposure_ev
+        gain = 2.0**camera.exposure_ev
         self._ambient = np.float32(gain * scene.ambient)
         self._lights = np.array([(*light.position_world, gain * light.power) for light in scene.lights], np.float32)
         self._lights = self._lights.reshape(-1, 4)

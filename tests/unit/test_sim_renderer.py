@@ -243,7 +243,7 @@ def test_a_stop_of_exposure_doubles_the_brightness() -> None:
     light = Light(position_world=(0.0, 0.0, 1.0), power=0.3)
     scene = Scene(objects=(thing(pixel_quad(-1, -1, 200, 200, 2.0)),), lights=(light,), ambient=0.1)
     dark, bright = (
-        draw_moment(VisibilityBufferRenderer(scene, CAMERA, exposure_ev=ev), AT_ORIGIN, {}).rgb.astype(int)
+        draw_moment(VisibilityBufferRenderer(scene, replace(CAMERA, exposure_ev=ev)), AT_ORIGIN, {}).rgb.astype(int)
         for ev in (0.0, 1.0)
     )
     assert bright.max() < 200 * 0.7  # below the soft limit
