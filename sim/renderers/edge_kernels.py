@@ -143,11 +143,28 @@ def shares(camera, faces, neighbours, fx, fy, s, t, ray_x, ray_y, far_x, far_y):
 
 
 @njit(**KERNEL)
-def blend_edges(camera, faces, neighbours, fx, fy, cx, cy, triangles, inverse_depth, rgb, row_first, row_last, smooth):
-    """Copy the rows row_first..row_last-1 of `rgb` to `smooth`, edges blended. Reads one more row on each side."""
+def blend_edges(
+    camera,
+    faces,
+    neighbours,
+    fx,
+    fy,
+    cx,
+    cy,
+    triangles,
+    inverse_depth,
+    colour,
+    row_first,
+    row_last,
+    rgb,
+):
+    """Fill the rows row_first..row_last-1 of `rgb` (H, W, 3) from `colour` (H, W), 0x00bbggrr, with edges blended.
+
+    Reads one more row on each side.
+    """
     height, width = triangles.shape
     half, zero = f32(0.5), f32(0)
-    flat_t, flat_w, flat_c, target = triangles.ravel(), inverse_depth.ravel(), rgb.ravel(), smooth.ravel()
+    flat_t, flat_w, flat_c, target = triangles.ravel(), inverse_depth.ravel(), colour.ravel(), rgb.ravel()
     # Shares of a row's pixels: from the left, the right, above, below; and those from above of the next row.
     left, right = np.zeros(width, np.float32), np.zeros(width, np.float32)
     above, below, following = np.zeros(width, np.float32), np.zeros(width, np.float32), np.zeros(width, np.float32)
@@ -180,10 +197,8 @@ def blend_edges(camera, faces, neighbours, fx, fy, cx, cy, triangles, inverse_de
                     below[x], following[x] = a, b
         if y >= row_first:
             for x in range(width):
-                colour = rgb[y, x]
-                smooth[y, x, 0] = colour & 255
-                smooth[y, x, 1] = (colour >> 8) & 255
-                smooth[y, x, 2] = colour >> 16
+                own = colour[y, x]
+                rgb[y, x, 0], rgb[y, x, 1], rgb[y, x, 2] = own & 255, (own >> 8) & 255, own >> 16
             for x in range(width):
                 # A slanted edge is met in both directions, with the same area.
                 across, along = left[x] + right[x], above[x] + below[x]
@@ -193,8 +208,7 @@ def blend_edges(camera, faces, neighbours, fx, fy, cx, cy, triangles, inverse_de
                 before, after = (left[x], right[x]) if across >= along else (above[x], below[x])
                 n = y * width + x
                 for c in range(3):
-                    own = f32((flat_c[n] >> 8 * c) & 255)
-                    value = own
+                    value = own = f32((flat_c[n] >> 8 * c) & 255)
                     if before > zero:
                         value += before * (f32((flat_c[n - step] >> 8 * c) & 255) - own)
                     if after > zero:

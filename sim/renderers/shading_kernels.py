@@ -13,7 +13,19 @@ import numpy as np
 from numba import njit
 
 from sim.renderers.kernels import KERNEL, cross
-from sim.renderers.texture_kernels import BLOCK, COLOUR, GREEN, INTEGER_ROWS, ORIGIN, RED_BLUE, SIDE, look_up
+from sim.renderers.texture_kernels import (
+    AREA,
+    BLOCK,
+    COLOUR,
+    GREEN,
+    INTEGER_ROWS,
+    ORIGIN,
+    RED_BLUE,
+    SIDE,
+    U,
+    V,
+    look_up,
+)
 
 f32 = np.float32
 
@@ -56,19 +68,19 @@ def shade(
     lights,
     ambient,
     shadow_maps,
-    rgb,
+    colour,
     depth,
     ids,
 ):
     """Colour, z-depth and id of the rows row_first..row_last-1, from the visibility buffer.
 
     Per block of pixels: interpolate the attributes, add up the light, look up the texture. Light varies slowly, so two
-    neighbours on one triangle share a lane of the lighting.
+    neighbours on one triangle share a lane of the lighting. `colour` (H, W) is 0x00bbggrr.
     """
     one, half, zero = f32(1), f32(0.5), f32(0)
-    u1, u2, u3 = np.uint64(1), np.uint64(2), np.uint64(3)
+    u1, u3 = np.uint64(1), np.uint64(3)
     flat_t, flat_w = triangles.ravel(), inverse_depth.ravel()
-    flat_rgb, flat_depth, flat_ids = rgb.ravel(), depth.ravel(), ids.ravel()
+    flat_colour, flat_depth, flat_ids = colour.ravel(), depth.ravel(), ids.ravel()
     width = triangles.shape[1]
     inverse_fx, inverse_fy = 1.0 / fx, 1.0 / fy
     inverse_focals = inverse_fx * inverse_fy
@@ -80,13 +92,12 @@ def shade(
     shadow_centre = f32(shadow_size - 1) * half
     shadow_focal = f32(shadow_size * 0.5 / SHADOW_TANGENT)
     offset_per_metre = SHADOW_OFFSET_TEXELS / shadow_focal if shadow_size > 0 else zero
-    # Rows of the scratch, by pixel: 0-1 uv, 2 texels per pixel; by lane: 3-5 normal, 6 ray x, 7 z, 8-10 position,
+    # Rows of the real scratch, by pixel: those of `look_up`; by lane: 3-5 normal, 6 ray x, 7 z, 8-10 position,
     # 11 brightness, 12 one light's share, 13-14 shadow texel, 15 limit of 1/z in the shadow map.
     s = np.zeros(16 * BLOCK, np.float32)
     integer = np.zeros(INTEGER_ROWS * BLOCK, np.int32)
-    colours = integer.view(np.uint32)
-    bright = np.zeros(BLOCK, np.uint32)
-    lane_of = np.zeros(BLOCK, np.int64)
+    natural = integer.view(np.uint32)
+    lane_of, factors = np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.uint32)
     rays_x = np.zeros(width, np.float32)
     for x in range(width):
         rays_x[x] = (x - cx) * inverse_fx
@@ -139,8 +150,8 @@ def shade(
                 b1 = min(max((q1x * ray_x + q1) * z, zero), one)
                 b2 = min(max((q2x * ray_x + q2) * z, zero), one - b1)
                 b0 = one - b1 - b2
-                s[n], s[BLOCK + n] = u_a * b0 + u_b * b1 + u_g * b2, v_a * b0 + v_b * b1 + v_g * b2
-                s[2 * BLOCK + n] = density * z * z * z
+                s[U + n], s[V + n] = u_a * b0 + u_b * b1 + u_g * b2, v_a * b0 + v_b * b1 + v_g * b2
+                s[AREA + n] = density * z * z * z
                 integer[SIDE + n], integer[ORIGIN + n] = side, origin
                 if is_open:
                     is_open = False
@@ -227,9 +238,9 @@ def shade(
 
             look_up(texels, s, integer)
             for n in range(BLOCK):
-                bright[n] = np.uint32(s[11 * BLOCK + lane_of[n]]) if integer[SIDE + n] > 0 else np.uint32(0)
+                factors[n] = np.uint32(s[11 * BLOCK + lane_of[n]]) if integer[SIDE + n] > 0 else np.uint32(0)
             for n in range(count):
-                colour, factor = colours[COLOUR + n], bright[n]
-                red_blue = (np.uint32((colour & RED_BLUE) * factor) >> np.uint32(8)) & RED_BLUE
-                green = (((colour & GREEN) >> np.uint32(8)) * factor) & GREEN
-                flat_rgb[row_start + np.uint64(x_first + n)] = red_blue | green
+                texel, factor = natural[COLOUR + n], factors[n]
+                red_blue = (np.uint32((texel & RED_BLUE) * factor) >> np.uint32(8)) & RED_BLUE
+                green = (((texel & GREEN) >> np.uint32(8)) * factor) & GREEN
+                flat_colour[row_start + np.uint64(x_first + n)] = red_blue | green

@@ -68,6 +68,7 @@ class VisibilityBufferRenderer:
         self._inverse_depth = np.zeros(shape, np.float32)
         self._triangles = np.full(shape, -1, np.int32)
         self._coverage = np.zeros(shape, np.uint32)
+        self._colour = np.zeros(shape, np.uint32)  # 0x00bbggrr, before edges are blended
         self._rendered = False
         gain = 2.0**camera.exposure_ev
         self._ambient = np.float32(gain * scene.ambient)
@@ -146,7 +147,7 @@ class VisibilityBufferRenderer:
             if any(box):
                 parts.append((actor.faces, box[:2], actor.bit if counts else np.uint32(0)))
 
-        raw, rgb = np.empty((height, width), np.uint32), np.empty((height, width, 3), np.uint8)
+        rgb = np.empty((height, width, 3), np.uint8)
 
         def draw(first: int, last: int) -> None:
             self._inverse_depth[first:last] = 0
@@ -186,7 +187,7 @@ class VisibilityBufferRenderer:
                 self._lights,
                 self._ambient,
                 self._shadows.maps,
-                raw,
+                self._colour,
                 depth_m,
                 ids,
             )
@@ -199,7 +200,7 @@ class VisibilityBufferRenderer:
                 *self._lens,
                 self._triangles,
                 self._inverse_depth,
-                raw,
+                self._colour,
                 first,
                 last,
                 rgb,
