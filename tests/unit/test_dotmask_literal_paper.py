@@ -1,12 +1,14 @@
 """The literal transcription of the paper is a second implementation: profile `paper` must believe what it believes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from benchmarks.literal_paper import LiteralDotMask
 from dotmask.pipeline import DotMask
-from dotmask.profiles import PAPER
+from dotmask.profiles import PAPER, Profile
 from dotmask.records import Detections, Intrinsics, RgbdFrame
 
 CAMERA = Intrinsics(width=160, height=120, fx=130.0, fy=128.0, cx=79.5, cy=60.5)
@@ -16,7 +18,9 @@ FRAMES, UNSEEN = 60, (20, 21, 22, 40)
 def camera_pose(index: int) -> np.ndarray:
     """A camera that turns about all of its axes and moves."""
     T = np.eye(4)
-    T[:3, :3] = Rotation.from_euler("xyz", [-1.5 + 0.003 * index, 0.05 * np.sin(0.05 * index), 0.004 * index]).as_matrix()
+    T[:3, :3] = Rotation.from_euler(
+        "xyz", [-1.5 + 0.003 * index, 0.05 * np.sin(0.05 * index), 0.004 * index]
+    ).as_matrix()
     T[:3, 3] = [0.01 * index, 0.05 * np.sin(0.1 * index), 1.2]
     return T
 
@@ -58,10 +62,13 @@ class Playback:
         return self._sequence[frame.index][1]
 
 
-@pytest.mark.parametrize("class_name", ["person", "chair"])
-def test_beliefs_verdicts_and_images_are_those_of_the_literal_transcription(class_name: str) -> None:
+ONLY_DEFORMATION = replace(PAPER, classes=tuple(replace(c, speed_threshold_m_s=10.0) for c in PAPER.classes))
+
+
+@pytest.mark.parametrize(("class_name", "profile"), [("chair", PAPER), ("person", PAPER), ("person", ONLY_DEFORMATION)])
+def test_beliefs_verdicts_and_images_are_those_of_the_literal_transcription(class_name: str, profile: Profile) -> None:
     sequence = recorded(class_name)
-    ours, literal = DotMask(Playback(sequence), PAPER), LiteralDotMask(PAPER)
+    ours, literal = DotMask(Playback(sequence), profile), LiteralDotMask(profile)
     verdicts = set()
     for index, (frame, detections) in enumerate(sequence):
         result = ours.step(frame, camera_pose(index))
