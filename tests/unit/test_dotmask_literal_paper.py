@@ -62,7 +62,9 @@ class Playback:
         return self._sequence[frame.index][1]
 
 
-ONLY_DEFORMATION = replace(PAPER, classes=tuple(replace(c, speed_threshold_m_s=10.0) for c in PAPER.classes))
+ONLY_DEFORMATION = replace(
+    PAPER, deformation_iou=0.85, classes=tuple(replace(c, speed_threshold_m_s=10.0) for c in PAPER.classes)
+)
 
 
 @pytest.mark.parametrize(("class_name", "profile"), [("chair", PAPER), ("person", PAPER), ("person", ONLY_DEFORMATION)])
