@@ -130,7 +130,7 @@ def test_a_step_that_raises_leaves_the_state_as_it_was() -> None:
         method.step(frame_at(2, 2.0), np.eye(4))  # a stamp of the past
     after = method.step(frame_at(5, 2.0), np.eye(4))
     assert [t.track_id for t in after.tracks] == [t.track_id for t in before.tracks]
-    assert after.tracks[0].age_frames == before.tracks[0].age_frames + 1
+    assert after.tracks[0].hits == before.tracks[0].hits + 1
 
 
 def test_refine_before_the_first_frame_is_refused() -> None:
