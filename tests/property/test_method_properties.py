@@ -10,10 +10,11 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from scipy.spatial.transform import Rotation
 
-from dotmask.classification import classify, mask_iou
+from dotmask.classification import classify
 from dotmask.evaluation.classification import ClassificationRecord, confusion
 from dotmask.evaluation.filter import chi_square_mean_bounds, normalised_squares
-from dotmask.masking import mask_depth
+from dotmask.mask_geometry import aligned_iou, intersection_over_union
+from dotmask.masking import Cutout, choose_cutouts, mask_depth
 from dotmask.profiles import CALIBRATED, PAPER, PROFILES
 from dotmask.records import Detections, Intrinsics, MaskedDepth, Observation, RgbdFrame, Track
 from dotmask.segmentation.selection import select_detections
@@ -23,7 +24,7 @@ from dotmask.tracking.measurement_model import CAMERA_POINT
 from dotmask.tracking.motion_model import predict
 from dotmask.tracking.tracker import TrackerState, track_objects
 
-ONE = Detections(masks=np.ones((1, 2, 2), bool), boxes_px=np.zeros((1, 4)), class_names=("chair",), scores=np.ones(1))
+MASK = np.ones((2, 2), bool)
 
 # ---- the filter on its own model ----------------------------------------------------------------
 
@@ -60,12 +61,12 @@ def test_nees_and_nis_are_consistent_on_the_exact_model(profile, class_name) -> 
             T = turned(k)
             z = T[:3, :3].T @ (x[:3] - T[:3, 3]) + root @ rng.normal(size=3)
             seen = Observation(
-                position_camera=z, covariance=R, class_name=class_name, detection_index=0, model=CAMERA_POINT
+                position_camera=z, covariance=R, class_name=class_name, detection_index=0, mask=MASK, model=CAMERA_POINT
             )
             if track is None:
-                track = initiate(seen, ONE, 0.0, T, profile, 1)
+                track = initiate(seen, 0.0, T, profile, 1)
             else:
-                track = update(predict(track, k * dt, profile), seen, ONE, T)
+                track = update(predict(track, k * dt, profile), seen, None, T, profile)
                 assert track.innovation is not None
                 nis.append(track.innovation.nis)
         assert track is not None
@@ -94,13 +95,14 @@ def test_the_covariance_stays_symmetric_and_positive_definite(positions, sigma, 
         covariance=sigma**2 * np.eye(3),
         class_name="person",
         detection_index=0,
+        mask=MASK,
         model=CAMERA_POINT,
     )
-    track = initiate(start, ONE, 0.0, T, CALIBRATED, 1)
+    track = initiate(start, 0.0, T, CALIBRATED, 1)
     for k, position in enumerate(positions):
         track = predict(track, (k + 1) * dt, CALIBRATED)
         if position is not None:
-            track = update(track, replace(start, position_camera=np.array(position)), ONE, T)
+            track = update(track, replace(start, position_camera=np.array(position)), None, T, CALIBRATED)
         np.testing.assert_array_equal(track.covariance, track.covariance.T)
         assert np.linalg.eigvalsh(track.covariance).min() > 0
 
@@ -124,15 +126,15 @@ def detections_of(masks, scores=None) -> Detections:
 @settings(max_examples=60, deadline=None)
 @given(depth=depths, masks=masks_of_three, moving=st.lists(st.booleans(), min_size=3, max_size=3))
 def test_masking_only_removes_and_a_second_time_changes_nothing(depth, masks, moving) -> None:
-    detections = detections_of(masks)
-    once = mask_depth(depth, detections, moving, (), CALIBRATED)
+    cutouts = [Cutout(mask=m, radius_px=3, is_moving=f) for m, f in zip(masks, moving, strict=True)]
+    once = mask_depth(depth, cutouts)
     for image in (once.mo_mdi_m, once.mdi_m):
         assert ((image == depth) | (image == 0)).all()
     assert (once.mdi_m <= once.mo_mdi_m).all()
     assert not once.mdi_m[masks.any(axis=0)].any()
-    again = mask_depth(once.mo_mdi_m, detections, moving, (), CALIBRATED)
+    again = mask_depth(once.mo_mdi_m, cutouts)
     np.testing.assert_array_equal(again.mo_mdi_m, once.mo_mdi_m)
-    np.testing.assert_array_equal(mask_depth(once.mdi_m, detections, moving, (), CALIBRATED).mdi_m, once.mdi_m)
+    np.testing.assert_array_equal(mask_depth(once.mdi_m, cutouts).mdi_m, once.mdi_m)
 
 
 @settings(max_examples=60, deadline=None)
@@ -143,16 +145,16 @@ def test_masking_only_removes_and_a_second_time_changes_nothing(depth, masks, mo
     order=st.permutations(range(3)),
 )
 def test_masks_do_not_depend_on_the_order_of_the_detections(depth, masks, moving, order) -> None:
-    one = mask_depth(depth, detections_of(masks), moving, (), PAPER)
-    other = mask_depth(depth, detections_of(masks[order]), [moving[i] for i in order], (), PAPER)
+    cutouts = [Cutout(mask=m, radius_px=1, is_moving=f) for m, f in zip(masks, moving, strict=True)]
+    one, other = mask_depth(depth, cutouts), mask_depth(depth, [cutouts[i] for i in order])
     np.testing.assert_array_equal(one.mo_mdi_m, other.mo_mdi_m)
     np.testing.assert_array_equal(one.mdi_m, other.mdi_m)
 
 
 @settings(max_examples=60, deadline=None)
-@given(masks=hnp.arrays(np.bool_, (2, *SIZE)), alignment=st.sampled_from(["none", "box"]))
-def test_iou_lies_between_zero_and_one(masks, alignment) -> None:
-    assert 0.0 <= mask_iou(masks[0], masks[1], alignment) <= 1.0
+@given(masks=hnp.arrays(np.bool_, (2, *SIZE)), measure=st.sampled_from([intersection_over_union, aligned_iou]))
+def test_iou_lies_between_zero_and_one(masks, measure) -> None:
+    assert 0.0 <= measure(masks[0], masks[1]) <= 1.0
 
 
 @settings(max_examples=60, deadline=None)
@@ -276,13 +278,14 @@ def run(pictures, profile, order=None):
         listed = p.detections if order is None else p.detections.select(order(len(p.detections)))
         detections = select_detections(listed, profile)
         observations = observe(detections, p.frame, profile)
-        after = track_objects(state, observations, detections, p.frame.timestamp_s, p.T_world_camera, profile)
+        after = track_objects(
+            state, observations, (None,) * len(detections), p.frame.timestamp_s, p.T_world_camera, CAMERA, profile
+        )
         known = {t.track_id: t for t in state.tracks}
         tracks = tuple(replace(t, verdict=classify(t, known.get(t.track_id), profile)) for t in after.tracks)
         state = replace(after, tracks=tracks)
-        moving = {t.detection_index for t in tracks if t.verdict is not None and t.verdict.is_moving}
-        flags = [i in moving for i in range(len(detections))]
-        steps.append(Step(detections, tracks, mask_depth(p.frame.depth_m, detections, flags, tracks, profile)))
+        cutouts = choose_cutouts(detections, tracks, p.T_world_camera, np.zeros(3), CAMERA, profile)
+        steps.append(Step(detections, tracks, mask_depth(p.frame.depth_m, cutouts)))
     return steps
 
 
@@ -311,7 +314,7 @@ def test_the_speed_of_a_walking_person_is_known_within_15_cm_per_second(pictures
     errors = [
         np.linalg.norm(track.velocity_world - pictures[k].velocities[instance])
         for k, i, track in beliefs(pictures, calibrated)
-        if i == instance and track.age_frames > RATE_HZ
+        if i == instance and track.hits > RATE_HZ
     ]
     assert len(errors) > 20
     assert np.sqrt(np.mean(np.square(errors))) < 0.15
@@ -321,7 +324,7 @@ def test_walkers_are_flagged_and_standing_chairs_are_not(pictures, calibrated) -
     records = []
     for k, instance, track in beliefs(pictures, calibrated):
         assert track.verdict is not None
-        is_new = track.age_frames < CALIBRATED.calm_frames
+        is_new = track.hits < CALIBRATED.calm_frames
         if not is_new:
             flagged = track.verdict.is_moving
             moving = instance in MOVING_IDS
@@ -370,6 +373,6 @@ def test_shuffled_detections_leave_the_images_for_slam_unchanged(pictures, profi
 
 def test_people_and_chairs_that_stand_still_end_up_idle() -> None:
     steps = run([picture(k, walking=False) for k in range(25)], CALIBRATED)
-    settled = [t for t in steps[-1].tracks if t.age_frames > CALIBRATED.calm_frames]
+    settled = [t for t in steps[-1].tracks if t.hits > CALIBRATED.calm_frames]
     assert len(settled) >= 4  # the camera moves: a person slides into the image at the end
     assert all(t.verdict is not None and not t.verdict.is_moving for t in settled)
