@@ -373,6 +373,7 @@ def test_shuffled_detections_leave_the_images_for_slam_unchanged(pictures, profi
 
 def test_people_and_chairs_that_stand_still_end_up_idle() -> None:
     steps = run([picture(k, walking=False) for k in range(25)], CALIBRATED)
-    settled = [t for t in steps[-1].tracks if t.hits > CALIBRATED.calm_frames]
-    assert len(settled) >= 4  # the camera moves: a person slides into the image at the end
+    # The camera moves: a person slides into the image at the end, and while more and more of it shows it is masked.
+    settled = [t for t in steps[-1].tracks if t.hits > RATE_HZ // 2]
+    assert len(settled) >= 4
     assert all(t.verdict is not None and not t.verdict.is_moving for t in settled)
