@@ -144,6 +144,19 @@ def test_the_masks_are_compared_where_the_tracks_are_predicted() -> None:
     assert associate(tracks, observations, np.eye(4), CAMERA, MASKS).pairs == ((0, 1), (1, 0))
 
 
+def test_a_camera_that_moves_moves_the_masks_of_tracks_that_stand() -> None:
+    """It looks along the world's x and has gone 0.4 m to its left: what it saw lies 20 pixels further to the right."""
+    T = np.eye(4)
+    T[:3, :3] = [[0, 0, 1], [-1, 0, 0], [0, -1, 0]]
+    T[:3, 3] = [3.0, 5.4, 1.0]
+    tracks = [
+        track([5.0, 5.0, 1.0], mask=rectangle(40, 40), mask_position=[0, 0, 2]),
+        track([5.0, 5.0, 1.0], mask=rectangle(60, 40), mask_position=[0, 0, 2]),
+    ]
+    observations = [seen([0.4, 0, 2], mask=rectangle(80, 40)), seen([0.4, 0, 2], mask=rectangle(60, 40))]
+    assert associate(tracks, observations, T, CAMERA, MASKS).pairs == ((0, 1), (1, 0))
+
+
 def test_the_overlap_counts_as_a_likelihood_beside_the_distance() -> None:
     """Minus twice the logarithm of the IoU adds to the squared distance: below its price masks win, above, distance."""
     one, other = rectangle(70, 40, 20, 20), rectangle(80, 40, 20, 20)  # IoU 1/3

@@ -7,8 +7,11 @@ import cv2
 import numpy as np
 import pytest
 
+from dotmask.geometry import inverse, transform
+from dotmask.mask_geometry import dilated_patch
+from dotmask.masking import growth_px
 from dotmask.pipeline import ClosedLoop, DotMask, MaskAll, Unmasked, extrapolate
-from dotmask.profiles import PoseFeedback, profile
+from dotmask.profiles import MaskGrowth, PoseFeedback, profile
 from dotmask.records import (
     Detections,
     FloatArray,
@@ -216,18 +219,35 @@ def test_a_surface_that_moves_and_one_that_the_camera_passes() -> None:
 
 
 def test_surfaces_are_seen_from_the_pose_of_odometry() -> None:
-    """The camera jumps in the last frame and the picture does not change: the object went along."""
-    poses = [at(0.0)] * 6 + [at(0.1)]
-    velocities = {}
-    for feedback in ("constant_velocity", "refined"):
+    """The camera jumps in frame 6 and the picture does not change: the object went along, and then both stand."""
+    poses = [at(0.0)] * 6 + [at(0.1)] * 4
+    velocities: dict[PoseFeedback, list[float]] = {"constant_velocity": [], "refined": []}
+    for feedback, found in velocities.items():
         method = loop(DotMask(BoxSegmenter(0.0), profile("calibrated")), poses, feedback)
-        for index in range(7):
-            result = method.step(textured(index, 0.0))
-        [track] = result.front_end.tracks
-        assert track.surface is not None
-        velocities[feedback] = track.surface.velocity_world[0]
-    assert velocities["constant_velocity"] == pytest.approx(0.0, abs=1e-6)
-    assert velocities["refined"] == pytest.approx(0.1 * RATE_HZ / 3, rel=0.05)  # over 0.1 s
+        for index in range(10):
+            [track] = method.step(textured(index, 0.0)).front_end.tracks
+            found.append(0.0 if track.surface is None else track.surface.velocity_world[0])
+    jump = 0.1 * RATE_HZ / 3  # over the last 0.1 s
+    assert velocities["refined"] == pytest.approx([0.0] * 6 + [jump] * 3 + [0.0], abs=0.02)
+    assert velocities["constant_velocity"][6] == pytest.approx(0.0, abs=1e-6), "it did not know yet"
+
+
+def test_masks_grow_by_the_way_of_the_camera_during_the_delay() -> None:
+    growth = MaskGrowth(base_px=1.0, depth_delay_s=0.1)
+    method = DotMask(BoxSegmenter(0.0), replace(profile("calibrated"), growth=growth))
+    radii = []
+    for index, pose in enumerate([at(0.0), at(0.02)]):  # 0.6 m/s
+        result = method.step(frame_at(index, 0.0), pose)
+        [track] = result.tracks
+        p_camera = transform(inverse(pose), track.position_world)
+        drift = track.velocity_world - np.array([0.6 * index, 0, 0])
+        radii.append(growth_px(p_camera, drift, CAMERA, growth))
+        region, patch = dilated_patch(mask_at(index, 0.0), radii[-1])
+        removed = np.zeros((CAMERA.height, CAMERA.width), bool)
+        removed[region] = patch
+        np.testing.assert_array_equal(result.masked.mdi_m == 0, removed)
+    assert radii[0] == 1, "in the first frame nothing is known of the camera's motion"
+    assert radii[1] >= 3
 
 
 def test_the_paper_follows_no_points() -> None:
