@@ -8,12 +8,12 @@ overlap.
 from collections.abc import Callable
 from functools import cache
 
-import cv2
 import numpy as np
 from scipy.special import gammaincinv
 
-from dotmask.profiles import MaskAlignment, Profile
-from dotmask.records import MaskImage, Reason, Track, Verdict
+from dotmask.mask_geometry import aligned_iou, intersection_over_union
+from dotmask.profiles import Profile
+from dotmask.records import Reason, Track, Verdict
 
 Classify = Callable[[Track, Track | None, Profile], Verdict]
 """The form of `classify`."""
@@ -39,18 +39,20 @@ def classify(track: Track, previous: Track | None, profile: Profile) -> Verdict:
             calm_frames=before.calm_frames,
         )
     model = profile.class_model(track.class_name)
-    iou = None
-    if model.is_non_rigid and previous is not None and previous.misses == 0 and track.misses == 0:
-        iou = mask_iou(previous.mask, track.mask, profile.mask_alignment)
-
-    # Half hidden, a standing object seems to move when more or less of it shows.
-    is_partial = track.partial_timestamp_s == track.timestamp_s
-    is_fast = speed > model.speed_threshold_m_s * (profile.partial_speed_factor if is_partial else 1.0)
+    surface, iou = track.surface, None
+    is_fast = speed > model.speed_threshold_m_s
     reason = Reason.IDLE
-    if is_fast and _is_significant(track, profile.speed_confidence):
+    if surface is not None and model.is_non_rigid:
+        # A hand may move before the body does, without a change of the mask.
+        is_fast = surface.moving_share >= model.moving_share
+        reason = Reason.SURFACE if is_fast else Reason.IDLE
+    elif surface is not None and surface.moving_share < model.moving_share:
+        is_fast = False
+    elif is_fast and _is_significant(track, profile.speed_confidence):
         reason = Reason.SPEED
-    elif iou is not None and iou < profile.deformation_iou:
-        reason = Reason.DEFORMATION
+    elif model.is_non_rigid and previous is not None and previous.misses == 0:
+        iou = (aligned_iou if profile.aligns_masks else intersection_over_union)(previous.mask, track.mask)
+        reason = Reason.DEFORMATION if iou < profile.deformation_iou else Reason.IDLE
     if reason is not Reason.IDLE:
         return Verdict(is_moving=True, reason=reason, speed_m_s=speed, mask_iou=iou, calm_frames=0)
 
@@ -63,38 +65,6 @@ def classify(track: Track, previous: Track | None, profile: Profile) -> Verdict:
         is_masked = profile.unknown_policy == "mask"
         return Verdict(is_moving=is_masked, reason=Reason.NEW, speed_m_s=speed, mask_iou=iou, calm_frames=calm)
     return Verdict(is_moving=True, reason=before.reason, speed_m_s=speed, mask_iou=iou, calm_frames=calm)
-
-
-def mask_iou(first: MaskImage, second: MaskImage, alignment: MaskAlignment) -> float:
-    """Intersection over union of two masks (H, W); 0 where both are empty.
-
-    With alignment "box" the first mask's bounding box is moved and scaled onto the second's, so that neither an object
-    that crosses the image nor one that comes nearer looks deformed.
-    """
-    a, b = _rectangle(first), _rectangle(second)
-    if alignment == "box":
-        if a[2] == 0 or b[2] == 0:
-            return 0.0
-        cut = np.ascontiguousarray(_cut(first, a)).view(np.uint8)
-        one = cv2.resize(cut, (b[2], b[3]), interpolation=cv2.INTER_NEAREST).view(np.bool_)
-        other = _cut(second, b)
-    else:
-        u0, v0 = min(a[0], b[0]), min(a[1], b[1])
-        u1, v1 = max(a[0] + a[2], b[0] + b[2]), max(a[1] + a[3], b[1] + b[3])
-        one, other = first[v0:v1, u0:u1], second[v0:v1, u0:u1]
-    union = int(np.count_nonzero(one | other))
-    return int(np.count_nonzero(one & other)) / union if union else 0.0
-
-
-def _rectangle(mask: MaskImage) -> tuple[int, int, int, int]:
-    """Left, top, width, height of the mask's pixels; all 0 for none."""
-    u, v, width, height = cv2.boundingRect(mask.view(np.uint8))
-    return u, v, width, height
-
-
-def _cut(mask: MaskImage, rectangle: tuple[int, int, int, int]) -> MaskImage:
-    u, v, width, height = rectangle
-    return mask[v : v + height, u : u + width]
 
 
 def _is_significant(track: Track, confidence: float) -> bool:

@@ -1,87 +1,118 @@
 """The masked depth images MDI and MO-MDI (paper, section III and the figure "Architecture of DOTMask")."""
 
 from collections.abc import Sequence
-from functools import cache
-from typing import Any
+from dataclasses import dataclass
 
-import cv2
 import numpy as np
-import numpy.typing as npt
 
-from dotmask.profiles import Profile
-from dotmask.records import DepthImage, Detections, MaskedDepth, MaskImage, Track
+from dotmask.geometry import inverse, transform
+from dotmask.mask_geometry import dilated_patch, moved_mask
+from dotmask.profiles import MaskGrowth, Profile
+from dotmask.records import DepthImage, Detections, FloatArray, Intrinsics, MaskedDepth, MaskImage, Track, TrackPhase
 
 
-def mask_depth(
-    depth_m: DepthImage,
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Cutout:
+    """One region that is removed from the depth.
+
+    Attributes:
+        mask: (H, W) bool.
+        radius_px: by which it grows before.
+        is_moving: whether it goes from the MO-MDI; all go from the MDI.
+    """
+
+    mask: MaskImage
+    radius_px: int
+    is_moving: bool
+
+
+def all_cutouts(detections: Detections, profile: Profile) -> tuple[Cutout, ...]:
+    """Every object of interest as if it moved."""
+    radius_px = round(profile.growth.base_px)
+    return tuple(Cutout(mask=mask, radius_px=radius_px, is_moving=True) for mask in detections.masks)
+
+
+def choose_cutouts(
     detections: Detections,
-    moving: Sequence[bool],
     tracks: Sequence[Track],
+    T_world_camera: FloatArray,
+    camera_velocity_world: FloatArray,
+    intrinsics: Intrinsics,
     profile: Profile,
-) -> MaskedDepth:
+) -> tuple[Cutout, ...]:
+    """What is removed from a frame's depth, and from which image.
+
+    A detection without a track has no valid depth: nothing is known of it, so it is removed as if it moved. A moving
+    track that was not seen for up to `profile.coasting_mask_frames` frames is removed where it is predicted: a
+    detector that misses a walking person once does not let it into the map.
+
+    Args:
+        detections: objects of interest of the frame.
+        tracks: after the frame, with verdicts.
+        T_world_camera: (4, 4) camera pose at the frame.
+        camera_velocity_world: (3,) metres per second.
+        intrinsics: of the camera.
+        profile: growth of the masks, and for how long unseen tracks are removed.
+    """
+    T_camera_world = inverse(T_world_camera)
+    seen = {track.detection_index: track for track in tracks if track.detection_index is not None}
+    cutouts = []
+    for index, mask in enumerate(detections.masks):
+        track = seen.get(index)
+        is_moving = track is None or _is_moving(track)
+        radius_px = round(profile.growth.base_px)
+        if track is not None:
+            drift = track.velocity_world - camera_velocity_world
+            p_camera = transform(T_camera_world, track.position_world)
+            radius_px = growth_px(p_camera, T_camera_world[:3, :3] @ drift, intrinsics, profile.growth)
+        cutouts.append(Cutout(mask=mask, radius_px=radius_px, is_moving=is_moving))
+    for track in tracks:
+        if track.phase is TrackPhase.COASTING and track.misses <= profile.coasting_mask_frames and _is_moving(track):
+            p_camera = transform(T_camera_world, track.position_world)
+            mask = moved_mask(track.mask, track.mask_position_camera, p_camera, intrinsics)
+            drift = T_camera_world[:3, :3] @ (track.velocity_world - camera_velocity_world)
+            radius_px = growth_px(p_camera, drift, intrinsics, profile.growth)
+            cutouts.append(Cutout(mask=mask, radius_px=radius_px, is_moving=True))
+    return tuple(cutouts)
+
+
+def growth_px(p_camera: FloatArray, velocity_camera: FloatArray, intrinsics: Intrinsics, growth: MaskGrowth) -> int:
+    """By how many pixels a mask grows: its own error, a margin in metres, and the way during the delay of the depth.
+
+    Args:
+        p_camera: (3,) where the object is, metres.
+        velocity_camera: (3,) of the object as the camera sees it, metres per second, camera axes.
+        intrinsics: of the camera.
+        growth: parameters.
+    """
+    px_per_m = intrinsics.fx / max(float(p_camera[2]), growth.nearest_m)
+    sideways_m = float(np.hypot(velocity_camera[0], velocity_camera[1])) * growth.depth_delay_s
+    return round(min(growth.base_px + (growth.margin_m + sideways_m) * px_per_m, growth.most_px))
+
+
+def mask_depth(depth_m: DepthImage, cutouts: Sequence[Cutout]) -> MaskedDepth:
     """Depth without the moving objects (MO-MDI) and without all objects of interest (MDI).
 
-    Every pixel of the result is the input's depth or 0, and a pixel is removed if any removed mask covers it: the
-    order of the detections does not matter.
+    Every pixel of the result is the input's depth or 0, and a pixel is removed if any cut-out covers it: their order
+    does not matter.
 
     Args:
         depth_m: (H, W) float32 metres, 0 = none; stays as it is.
-        detections: objects of interest of this frame.
-        moving: for each detection whether it goes from the MO-MDI.
-        tracks: of this frame. With `profile.coasting_mask_frames` above 0, the last mask of a moving track that was not
-            seen for up to so many frames goes from both images: a detector that misses a walking person once does
-            not let it into the map.
-        profile: dilation of the masks.
-
-    Raises:
-        ValueError: `moving` does not have one value per detection.
+        cutouts: what is removed.
     """
-    if len(moving) != len(detections):
-        raise ValueError(f"moving: {len(moving)} values for {len(detections)} detections")
-    coasting = [
-        track.mask
-        for track in tracks
-        if 0 < track.misses <= profile.coasting_mask_frames and track.verdict is not None and track.verdict.is_moving
-    ]
-    removed = [mask for mask, is_moving in zip(detections.masks, moving, strict=True) if is_moving]
-    kept = [mask for mask, is_moving in zip(detections.masks, moving, strict=True) if not is_moving]
     mo_mdi = depth_m.copy()
-    for mask in (*removed, *coasting):
-        _cut_out(mo_mdi, mask, profile.dilation_px)
+    _remove(mo_mdi, [cutout for cutout in cutouts if cutout.is_moving])
     mdi = mo_mdi.copy()
-    for mask in kept:
-        _cut_out(mdi, mask, profile.dilation_px)
+    _remove(mdi, [cutout for cutout in cutouts if not cutout.is_moving])
     return MaskedDepth(mo_mdi_m=mo_mdi, mdi_m=mdi)
 
 
-def dilate(mask: MaskImage, radius_px: int) -> MaskImage:
-    """`mask` (H, W) grown by a disc of `radius_px` pixels."""
-    grown = mask.copy()
-    region, patch = _dilated_patch(mask, radius_px)
-    grown[region] = patch
-    return grown
+def _remove(depth_m: DepthImage, cutouts: Sequence[Cutout]) -> None:
+    """Set `depth_m` to 0 under the grown masks, in place."""
+    for cutout in cutouts:
+        region, patch = dilated_patch(cutout.mask, cutout.radius_px)
+        np.copyto(depth_m[region], 0.0, where=patch)
 
 
-def _cut_out(depth_m: npt.NDArray[np.float32], mask: MaskImage, radius_px: int) -> None:
-    """Set `depth_m` to 0 under the dilated `mask`, in place."""
-    region, patch = _dilated_patch(mask, radius_px)
-    np.copyto(depth_m[region], 0.0, where=patch)
-
-
-def _dilated_patch(mask: MaskImage, radius_px: int) -> tuple[tuple[slice, slice], MaskImage]:
-    """The rectangle that the dilated mask lies in, and the dilated mask inside it."""
-    pixels = mask.view(np.uint8)
-    u, v, width, height = cv2.boundingRect(pixels)
-    if width == 0:
-        return (slice(0, 0), slice(0, 0)), mask[:0, :0]
-    rows = slice(max(v - radius_px, 0), min(v + height + radius_px, mask.shape[0]))
-    columns = slice(max(u - radius_px, 0), min(u + width + radius_px, mask.shape[1]))
-    region = (rows, columns)
-    if radius_px == 0:
-        return region, mask[region]
-    return region, cv2.dilate(pixels[region], _disc(radius_px)).view(np.bool_)
-
-
-@cache
-def _disc(radius_px: int) -> npt.NDArray[Any]:
-    return cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius_px + 1, 2 * radius_px + 1))
+def _is_moving(track: Track) -> bool:
+    return track.verdict is not None and track.verdict.is_moving

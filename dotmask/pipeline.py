@@ -19,12 +19,22 @@ from scipy.spatial.transform import Rotation
 
 from dotmask.classification import Classify, classify
 from dotmask.interfaces import Segmenter, SlamBackend
-from dotmask.masking import mask_depth
+from dotmask.masking import all_cutouts, choose_cutouts, mask_depth
 from dotmask.profiles import PoseFeedback, Profile
-from dotmask.records import Detections, FloatArray, MaskedDepth, Observation, PoseEstimate, RgbdFrame, Track
+from dotmask.records import (
+    Detections,
+    FloatArray,
+    MaskedDepth,
+    Observation,
+    PoseEstimate,
+    RgbdFrame,
+    SurfaceMotion,
+    Track,
+)
 from dotmask.segmentation.selection import select_detections
 from dotmask.tracking.association import Associate, associate
 from dotmask.tracking.measurement import observe
+from dotmask.tracking.surface import SurfacePoints, follow, surface_motions
 from dotmask.tracking.tracker import TrackerState, track_objects
 
 
@@ -104,7 +114,7 @@ class MaskAll:
         with clock("segment"):
             detections = select_detections(self._segmenter.segment(frame), self._profile)
         with clock("mask"):
-            masked = mask_depth(frame.depth_m, detections, [True] * len(detections), (), self._profile)
+            masked = mask_depth(frame.depth_m, all_cutouts(detections, self._profile))
         self._result = FrontEndResult(
             detections=detections, observations=(), tracks=(), masked=masked, stage_seconds=clock.seconds
         )
@@ -121,6 +131,8 @@ class _Kept:
 
     before: TrackerState
     frame: RgbdFrame
+    points: SurfacePoints | None
+    T_world_camera: FloatArray
     result: FrontEndResult
 
 
@@ -160,15 +172,20 @@ class DotMask:
             detections = select_detections(self._segmenter.segment(frame), self._profile)
         with clock("track"):
             observations = observe(detections, frame, self._profile)
-            after = self._track(before, frame, detections, observations, T_world_camera)
+            points = self._follow(frame, detections)
+            after = self._track(before, frame, detections, observations, points, T_world_camera)
         with clock("classify"):
             after = self._classify(before, after)
         with clock("mask"):
-            moving = {t.detection_index for t in after.tracks if t.verdict is not None and t.verdict.is_moving}
-            seen = {t.detection_index for t in after.tracks}
-            # A detection without a track has no valid depth: nothing is known of it, so it is masked.
-            removed = [i in moving or i not in seen for i in range(len(detections))]
-            masked = mask_depth(frame.depth_m, detections, removed, after.tracks, self._profile)
+            cutouts = choose_cutouts(
+                detections,
+                after.tracks,
+                T_world_camera,
+                self._camera_velocity(frame, T_world_camera),
+                frame.intrinsics,
+                self._profile,
+            )
+            masked = mask_depth(frame.depth_m, cutouts)
         result = FrontEndResult(
             detections=detections,
             observations=observations,
@@ -176,7 +193,7 @@ class DotMask:
             masked=masked,
             stage_seconds=clock.seconds,
         )
-        self._state, self._kept = after, _Kept(before, frame, result)
+        self._state, self._kept = after, _Kept(before, frame, points, T_world_camera, result)
         return result
 
     def refine(self, T_world_camera: FloatArray) -> FrontEndResult:
@@ -187,16 +204,31 @@ class DotMask:
         """
         if self._kept is None:
             raise ValueError("refine: no frame has been processed yet")
-        before, frame, result = self._kept.before, self._kept.frame, self._kept.result
+        before, frame, points, result = self._kept.before, self._kept.frame, self._kept.points, self._kept.result
         assert result.detections is not None
         clock = StageClock()
         clock.seconds.update(result.stage_seconds)
         with clock("track"):
-            after = self._track(before, frame, result.detections, result.observations, T_world_camera)
+            after = self._track(before, frame, result.detections, result.observations, points, T_world_camera)
         with clock("classify"):
             after = self._classify(before, after)
-        self._state = after
+        self._state, self._kept.T_world_camera = after, T_world_camera
         return replace(result, tracks=after.tracks, stage_seconds=clock.seconds)
+
+    def _camera_velocity(self, frame: RgbdFrame, T_world_camera: FloatArray) -> FloatArray:
+        """(3,) world, metres per second, since the frame before; 0 in the first frame."""
+        if self._kept is None:
+            return np.zeros(3)
+        elapsed_s = frame.timestamp_s - self._kept.frame.timestamp_s
+        return np.asarray((T_world_camera[:3, 3] - self._kept.T_world_camera[:3, 3]) / elapsed_s)
+
+    def _follow(self, frame: RgbdFrame, detections: Detections) -> SurfacePoints | None:
+        settings, kept = self._profile.surface, self._kept
+        if settings is None:
+            return None
+        # The pose of the frame before is known by now as well as it will ever be.
+        before, T_world_camera_before = (None, None) if kept is None else (kept.points, kept.T_world_camera)
+        return follow(before, frame, detections, T_world_camera_before, settings)
 
     def _track(
         self,
@@ -204,10 +236,23 @@ class DotMask:
         frame: RgbdFrame,
         detections: Detections,
         observations: tuple[Observation, ...],
+        points: SurfacePoints | None,
         T_world_camera: FloatArray,
     ) -> TrackerState:
+        profile = self._profile
+        surfaces: tuple[SurfaceMotion | None, ...] = (None,) * len(detections)
+        if points is not None and profile.surface is not None:
+            models = [profile.class_model(name) for name in detections.class_names]
+            surfaces = surface_motions(points, models, T_world_camera, frame.intrinsics, profile.noise, profile.surface)
         return track_objects(
-            before, observations, detections, frame.timestamp_s, T_world_camera, self._profile, self._associate
+            before,
+            observations,
+            surfaces,
+            frame.timestamp_s,
+            T_world_camera,
+            frame.intrinsics,
+            profile,
+            self._associate,
         )
 
     def _classify(self, before: TrackerState, after: TrackerState) -> TrackerState:

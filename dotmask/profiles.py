@@ -16,7 +16,6 @@ from dotmask.records import FloatArray
 
 PoseFeedback = Literal["previous", "constant_velocity", "refined"]
 UnknownPolicy = Literal["mask", "keep"]
-MaskAlignment = Literal["none", "box"]
 Measurement = Literal["bbox_centre", "mask_centroid", "pixel_depth"]
 
 
@@ -34,12 +33,12 @@ class ClassModel:
         is_non_rigid: whether the deformation test applies (paper, Moving Object Classification).
         shape_sigma_m: how far the measured point (box centre, mean depth) strays from the object's path because the
             shape changes (swinging arms and legs), along the camera's x, y, z (calibrated).
-        extent_m: usual width, height and depth: bounds what a truncated or half hidden box can be off (calibrated).
-        size_play: share by which the box's width and height differ from their usual size while nothing hides the
-            object: the stride of a walking person (calibrated).
-        hidden_factor: R is widened by this times the offset that a hidden side can cause. Above 1 because that offset
-            does not change from frame to frame as white noise would: an error that lasts for n frames weighs as much
-            as white noise with sqrt(n) times its sigma.
+        slide_sigma_m: how far, per root second, the measured point slides over the object while something hides a side
+            of it (calibrated).
+        surface_sigma_m_s: how much the velocity of the surface's points differs from that of the object's centre
+            because it turns and swings (calibrated).
+        moving_share: share of the surface's points that must move: a hand of what is not rigid, most of what is
+            (calibrated).
     """
 
     name: str
@@ -49,9 +48,9 @@ class ClassModel:
     vertical_share: float = 1.0
     is_non_rigid: bool = False
     shape_sigma_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    extent_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    size_play: tuple[float, float] = (0.0, 0.0)
-    hidden_factor: float = 1.0
+    slide_sigma_m: float = 0.0
+    surface_sigma_m_s: float = 0.0
+    moving_share: float = 0.5
 
     def __post_init__(self) -> None:
         """Refuse what no filter can use."""
@@ -80,8 +79,7 @@ class MeasurementNoise:
             disparity, Khoshelham and Elberink 2012, "Accuracy and resolution of Kinect depth data").
         depth_rounding_m: step of the depth image's numbers: 1/5000 m in files of the TUM benchmark.
         is_diagonal: leave out that an error in depth moves x and y along the viewing ray.
-        inflates_hidden_sides: widen R on an axis where the box ends at the image border or at something nearer.
-        hidden_depth_share: share of the class's depth by which the mean depth of a half hidden object can be off.
+        notices_hidden_sides: look whether the box ends at the image border or at something nearer.
         occluder_margin_m: how much nearer than the object an occluder must be at 0 m; grows by 0.02 z².
         pose_position_sigma_m: camera position, each axis.
         pose_rotation_sigma_rad: camera rotation; becomes `sigma z` metres sideways.
@@ -95,11 +93,56 @@ class MeasurementNoise:
     edge_sigma_px: float = 0.0
     depth_step_per_m: float = 0.0
     depth_rounding_m: float = 0.0
-    inflates_hidden_sides: bool = False
-    hidden_depth_share: float = 0.0
+    notices_hidden_sides: bool = False
     occluder_margin_m: float = 0.12
     pose_position_sigma_m: float = 0.0
     pose_rotation_sigma_rad: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SurfaceSettings:
+    """Points on the objects' surfaces (calibrated; not in the paper), see dotmask.tracking.surface.
+
+    Attributes:
+        points: wanted for each object.
+        least_points: fewer say nothing.
+        memory_frames: for how many frames a point's positions are kept.
+        velocity_s: a point's velocity is taken over at most this time.
+        flow_sigma_px: of a point's place in the image after `memory_frames`.
+        flow_sigmas: a point moves if it left its place by more than so many of them.
+    """
+
+    points: int = 24
+    least_points: int = 5
+    memory_frames: int = 10
+    velocity_s: float = 0.11
+    flow_sigma_px: float = 0.5
+    flow_sigmas: float = 3.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MaskGrowth:
+    """By how much masks grow before they are cut out (not in the paper's text).
+
+    Attributes:
+        base_px: radius for the error of the mask and of the depth at edges.
+        margin_m: further radius in metres at the object: more pixels when it is near.
+        depth_delay_s: time between the colour image, which the mask is of, and the depth image: the object moves on.
+            The paper names this delay as a cause of artefacts (Results).
+        nearest_m: an object is taken to be at least this far away.
+        most_px: the radius is never larger.
+    """
+
+    base_px: float
+    margin_m: float = 0.0
+    depth_delay_s: float = 0.0
+    nearest_m: float = 0.3
+    most_px: float = 16.0
+
+    def __post_init__(self) -> None:
+        """Refuse a mask that shrinks."""
+        if min(self.base_px, self.margin_m, self.depth_delay_s) < 0:
+            raise ValueError("growth of masks: base_px, margin_m and depth_delay_s must not be negative")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,6 +155,7 @@ class Profile:
         score_threshold: detections below it are dropped (paper, Table I).
         max_observations: at most this many detections, the best first (paper, Table I: m).
         max_misses: a track ends when it was not observed for this many frames (paper, Table I: e).
+        confirming_hits: a track that was seen less often is tentative and ends when it is missed (not in the paper).
         measurement: what is measured of a detection (see dotmask.tracking.measurement.observe); paper: `bbox_centre`.
         noise: the model behind R.
         min_depth_pixels: fewer pixels with depth give no observation (not in the paper).
@@ -119,24 +163,22 @@ class Profile:
             all (paper: "average depth from the masked region").
         gate_probability: an observation is a candidate for a track if its squared Mahalanobis distance is below this
             quantile of chi-square with 3 degrees of freedom (not in the paper).
-        jump_share: share of an object that may be hidden or freed from one frame to the next. R is widened by what is
-            missing of a box's usual size, and tracks and observations left over by the gate are tried once more
-            with R widened by this share; 0 does neither (calibrated).
-        whole_s: an object that was seen whole for this long and then leaves the gate has changed its velocity; one that
-            was not has come out from behind something (calibrated).
-        size_memory_s: how long the usual size of a box is remembered after the box has shrunk (calibrated).
+        least_mask_likelihood: where the gate holds several candidates, the IoU of the masks counts as a likelihood, but
+            never less than this; 1: masks have no say (paper).
+        reappearance_m: tracks and observations that the gate left over are paired once more with tracks whose position
+            is this uncertain: an object that comes out from behind something is seen elsewhere; 0 does not
+            (calibrated).
+        surface: points on the objects' surfaces; None: none are followed (paper).
         speed_confidence: speed counts as motion only if zero velocity is outside this confidence region of the
             velocity; 0 means the speed alone decides (paper).
-        partial_speed_factor: on the speed threshold while something hides a part of the object; 1 = no difference
-            (calibrated).
         deformation_iou: a non-rigid object whose consecutive masks have an IoU BELOW this is moving. The paper gives no
             value and prints "above": misprint (e).
-        mask_alignment: how masks are laid over each other before the IoU: as they are, or with their boxes aligned in
-            centre and scale.
+        aligns_masks: whether masks are laid over each other with their boxes before the IoU, so that neither the
+            camera's motion nor a change of distance counts (calibrated), or as they are (paper).
         calm_frames: consecutive frames of idle evidence until a new or moving object is idle; 1 = no hysteresis.
         unknown_policy: what a track is in its first frames, before it is known to be idle: masked or kept.
-        dilation_px: radius by which masks grow before they are cut out (not in the paper's text).
-        coasting_mask_frames: for how many frames the last mask of an unseen moving track is still cut out.
+        growth: of masks before they are cut out.
+        coasting_mask_frames: for how many frames an unseen moving track is still cut out, where it is predicted.
         pose_feedback: default camera pose for the tracker (see dotmask.pipeline.ClosedLoop).
     """
 
@@ -145,33 +187,33 @@ class Profile:
     score_threshold: float
     max_observations: int
     max_misses: int
+    confirming_hits: int
     measurement: Measurement
     noise: MeasurementNoise
     min_depth_pixels: int
     depth_trim_m: float | None
     gate_probability: float
-    jump_share: float
-    size_memory_s: float
-    whole_s: float
+    least_mask_likelihood: float
+    reappearance_m: float
+    surface: SurfaceSettings | None
     speed_confidence: float
-    partial_speed_factor: float
     deformation_iou: float
-    mask_alignment: MaskAlignment
+    aligns_masks: bool
     calm_frames: int
     unknown_policy: UnknownPolicy
-    dilation_px: int
+    growth: MaskGrowth
     coasting_mask_frames: int
     pose_feedback: PoseFeedback
 
     def __post_init__(self) -> None:
         """Refuse values outside their range."""
-        for name in ("max_observations", "max_misses", "min_depth_pixels", "calm_frames"):
+        for name in ("max_observations", "max_misses", "confirming_hits", "min_depth_pixels", "calm_frames"):
             if getattr(self, name) < 1:
                 raise ValueError(f"profile {self.name}: {name} must be at least 1")
         if not (0 < self.gate_probability < 1 and 0 <= self.speed_confidence < 1):
             raise ValueError(f"profile {self.name}: probabilities must lie between 0 and 1")
-        if self.dilation_px < 0 or self.coasting_mask_frames < 0:
-            raise ValueError(f"profile {self.name}: dilation_px and coasting_mask_frames must not be negative")
+        if self.coasting_mask_frames < 0:
+            raise ValueError(f"profile {self.name}: coasting_mask_frames must not be negative")
 
     def class_model(self, class_name: str) -> ClassModel:
         """The model of `class_name`.
@@ -208,21 +250,21 @@ PAPER = Profile(
     score_threshold=0.1,
     max_observations=5,
     max_misses=10,
+    confirming_hits=1,
     measurement="bbox_centre",
     noise=MeasurementNoise(pixel_sigma_px=4.0, depth_sigma_m=0.02, depth_sigma_per_m=0.0019, is_diagonal=True),
     min_depth_pixels=1,
     depth_trim_m=None,
     gate_probability=0.9999,
-    jump_share=0.0,
-    size_memory_s=1.0,
-    whole_s=0.0,
+    least_mask_likelihood=1.0,
+    reappearance_m=0.0,
+    surface=None,
     speed_confidence=0.0,
-    partial_speed_factor=1.0,
     deformation_iou=0.9,
-    mask_alignment="none",
+    aligns_masks=False,
     calm_frames=1,
     unknown_policy="keep",
-    dilation_px=1,
+    growth=MaskGrowth(base_px=1.0),
     coasting_mask_frames=0,
     pose_feedback="previous",
 )
@@ -236,16 +278,17 @@ PAPER = Profile(
 """
 
 
-def _calibrated_small(name: str) -> ClassModel:
+def _calibrated_thing(name: str, *, shape_sigma_m: float, slide_sigma_m: float) -> ClassModel:
     return ClassModel(
         name=name,
         acceleration_sigma_m_s2=0.5,
         prior_speed_sigma_m_s=0.5,
         speed_threshold_m_s=0.1,
-        shape_sigma_m=(0.005, 0.005, 0.01),
-        extent_m=(0.1, 0.2, 0.1),
-        size_play=(0.1, 0.1),
-        hidden_factor=2.5,
+        vertical_share=0.2 if name == "chair" else 1.0,
+        shape_sigma_m=(shape_sigma_m, shape_sigma_m, shape_sigma_m),
+        slide_sigma_m=slide_sigma_m,
+        surface_sigma_m_s=0.03,
+        moving_share=0.55,
     )
 
 
@@ -259,27 +302,19 @@ CALIBRATED = Profile(
             speed_threshold_m_s=0.1,
             vertical_share=0.2,
             is_non_rigid=True,
-            shape_sigma_m=(0.08, 0.03, 0.06),
-            extent_m=(0.6, 1.7, 0.5),
-            size_play=(0.5, 0.1),
+            shape_sigma_m=(0.03, 0.02, 0.03),
+            slide_sigma_m=0.2,
+            surface_sigma_m_s=0.15,
+            moving_share=0.12,
         ),
-        ClassModel(
-            name="chair",
-            acceleration_sigma_m_s2=0.5,
-            prior_speed_sigma_m_s=0.5,
-            speed_threshold_m_s=0.15,
-            vertical_share=0.2,
-            shape_sigma_m=(0.012, 0.012, 0.015),
-            extent_m=(0.65, 1.0, 0.65),
-            size_play=(0.15, 0.1),
-            hidden_factor=4.0,
-        ),
-        _calibrated_small("cup"),
-        _calibrated_small("bottle"),
+        _calibrated_thing("chair", shape_sigma_m=0.012, slide_sigma_m=0.2),
+        _calibrated_thing("cup", shape_sigma_m=0.005, slide_sigma_m=0.05),
+        _calibrated_thing("bottle", shape_sigma_m=0.005, slide_sigma_m=0.05),
     ),
     score_threshold=0.3,
     max_observations=10,
     max_misses=30,
+    confirming_hits=3,
     measurement="bbox_centre",
     noise=MeasurementNoise(
         pixel_sigma_px=0.0,
@@ -290,25 +325,23 @@ CALIBRATED = Profile(
         edge_sigma_px=0.29,
         depth_step_per_m=0.00284,
         depth_rounding_m=0.0002,
-        inflates_hidden_sides=True,
-        hidden_depth_share=0.25,
+        notices_hidden_sides=True,
         pose_position_sigma_m=0.003,
         pose_rotation_sigma_rad=0.002,
     ),
     min_depth_pixels=30,
     depth_trim_m=0.8,
     gate_probability=0.98,
-    jump_share=0.5,
-    size_memory_s=3.0,
-    whole_s=0.4,
+    least_mask_likelihood=0.02,
+    reappearance_m=0.3,
+    surface=SurfaceSettings(),
     speed_confidence=0.99,
-    partial_speed_factor=2.0,
     deformation_iou=0.9,
-    mask_alignment="box",
-    calm_frames=10,
+    aligns_masks=True,
+    calm_frames=4,
     unknown_policy="mask",
-    dilation_px=4,
-    coasting_mask_frames=3,
+    growth=MaskGrowth(base_px=3.0, margin_m=0.005, depth_delay_s=0.005),
+    coasting_mask_frames=10,
     pose_feedback="refined",
 )
 """Our best: R absorbs the wobble of walking people and the jumps of half hidden boxes, speed is tested against its own

@@ -166,6 +166,7 @@ class Observation:
         covariance: (3, 3) R of the paper, of what `model` says is measured, in the units of that.
         class_name: COCO class name.
         detection_index: which of the frame's detections this is.
+        mask: (H, W) bool, of that detection.
         model: what is measured; `model.measured(position_camera)` is z of the paper.
         is_partial: whether something nearer, or the image border, hides a side of it.
     """
@@ -174,6 +175,7 @@ class Observation:
     covariance: FloatArray
     class_name: str
     detection_index: int
+    mask: MaskImage
     model: MeasurementModel
     is_partial: bool = False
 
@@ -202,10 +204,36 @@ class Innovation:
         return float(self.residual @ np.linalg.solve(self.covariance, self.residual))
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SurfaceMotion:
+    """How points on the surface of one object moved over the last frames, the camera's own motion taken out.
+
+    Attributes:
+        points: how many were followed.
+        moving_share: share of them that are not where they would be if they stood still.
+        velocity_world: (3,) their median velocity, metres per second.
+        covariance: (3, 3) of it as a measure of the object's velocity.
+    """
+
+    points: int
+    moving_share: float
+    velocity_world: FloatArray
+    covariance: FloatArray
+
+
+class TrackPhase(Enum):
+    """Where a track is in its life; what has ended is no longer reported."""
+
+    TENTATIVE = "tentative"
+    CONFIRMED = "confirmed"
+    COASTING = "coasting"
+
+
 class Reason(Enum):
     """Why the moving object classification (MOC) answered as it did."""
 
     SPEED = "speed"
+    SURFACE = "surface"
     DEFORMATION = "deformation"
     NEW = "new"
     IDLE = "idle"
@@ -240,13 +268,16 @@ class Track:
         timestamp_s: time of the belief, seconds.
         mean: (6,) position and velocity in the world, metres and metres per second.
         covariance: (6, 6) P.
-        age_frames: frames since birth; 1 in the frame of birth.
+        hits: frames in which it was seen.
         misses: consecutive frames without an observation; 0 = seen in this frame.
+        phase: tentative until it was seen often enough, then confirmed, or coasting while it is not seen.
         detection_index: the detection of this frame that it was updated with; None when not seen.
         mask: (H, W) bool, the last mask seen.
         mask_timestamp_s: when it was seen.
+        mask_position_camera: (3,) where the track was then in the camera frame, metres.
         partial_timestamp_s: when something last hid a part of it, or when it was first seen.
         innovation: of this frame's update; None at birth and when not seen.
+        surface: how its surface moved; None when not seen, or with too few points.
         verdict: moving or idle; None until the classification has run.
     """
 
@@ -255,13 +286,16 @@ class Track:
     timestamp_s: float
     mean: FloatArray
     covariance: FloatArray
-    age_frames: int
+    hits: int
     misses: int
+    phase: TrackPhase
     detection_index: int | None
     mask: MaskImage
     mask_timestamp_s: float
+    mask_position_camera: FloatArray
     partial_timestamp_s: float
     innovation: Innovation | None = None
+    surface: SurfaceMotion | None = None
     verdict: Verdict | None = None
 
     def __post_init__(self) -> None:
@@ -270,6 +304,11 @@ class Track:
             object.__setattr__(self, name, checked(getattr(self, name), name, shape, np.float64))
             check_finite(getattr(self, name), name)
         object.__setattr__(self, "mask", checked(self.mask, "mask", (None, None), np.bool_))
+
+    @property
+    def is_partial(self) -> bool:
+        """Whether something hid a part of it when it was last seen."""
+        return self.partial_timestamp_s == self.mask_timestamp_s
 
     @property
     def position_world(self) -> FloatArray:

@@ -1,18 +1,30 @@
 """The judge: sees the truth and what a method made of each frame, and scores every stage."""
 
 from collections import defaultdict
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
 
 import numpy as np
 
-from dotmask.evaluation.classification import ClassificationRecord, classification_scores
-from dotmask.evaluation.masks import MaskCounts, count_masking, count_overlap
-from dotmask.evaluation.tracking import FrameIdentities, filter_errors, identity_scores, match_detections
+from dotmask.evaluation.classification import ClassificationRecord, confusion, roc
+from dotmask.evaluation.filter import BeliefSample, filter_errors, innovation_whiteness
+from dotmask.evaluation.identities import FrameIdentities, clear_scores, hota_scores, idf1
+from dotmask.evaluation.latency import latency_scores
+from dotmask.evaluation.masks import MaskCounts, count_masking, count_outlines, count_overlap
+from dotmask.evaluation.matching import mask_ious, match_detections
 from dotmask.evaluation.trajectory import absolute_trajectory_error, relative_pose_error
 from dotmask.pipeline import FrameResult
 from dotmask.records import FloatArray, Track, Trajectory
 from scenarios.oracle import CLASSES, MIN_PIXELS
-from scenarios.report import EkfReport, MaskReport, MethodReport, MocReport, StageTimes, TrackingReport
+from scenarios.report import (
+    ConfusionReport,
+    EkfReport,
+    MaskReport,
+    MethodReport,
+    MocReport,
+    StageTimes,
+    TrackingReport,
+)
 from scenarios.run_folder import RunFolder
 from sim.records import GroundTruth, ObjectTruth
 
@@ -29,16 +41,8 @@ TRACK_COLUMNS = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class BeliefSample:
-    """One observed track in one frame beside its truth."""
-
-    mean: FloatArray
-    covariance: FloatArray
-    centre_world: FloatArray
-    velocity_world: FloatArray
-    ideal_world: FloatArray
-    nis: float
+OUTLINES_EVERY = 5
+"""Frames from one judgement of the outlines to the next: the dearest measure, of what changes slowly."""
 
 
 class Judge:
@@ -88,41 +92,22 @@ class Judge:
         detections = result.front_end.detections
         if detections is None:
             return
-        frame = result.frame
-        matches = match_detections(detections.masks, truth.instance_ids)
-        self._masks += count_overlap(detections.masks, truth.instance_ids, matches)
-        tracks = result.front_end.tracks
-        if not tracks and not result.front_end.observations:
+        frame, tracks = result.frame, result.front_end.tracks
+        ious = mask_ious(detections.masks, truth.instance_ids)
+        matches = match_detections(ious)
+        self._masks += count_overlap(ious, matches)
+        if frame.index % OUTLINES_EVERY == 0:
+            self._masks += count_outlines(detections.masks, truth.instance_ids, matches)
+        if "track" not in result.stage_seconds:
             return
+        self._classified += _classified(truth, result, matches)
+        self._identities.append(_identities(truth, tracks, ious))
         actors = {actor.instance_id: actor for actor in truth.objects}
-        by_detection = {t.detection_index: t for t in tracks if t.detection_index is not None}
-        for index, instance in enumerate(matches):
-            if instance not in actors:
-                continue
-            track = by_detection.get(index)
-            # What has no track is masked by the pipeline, hence answered as moving.
-            flagged = track is None or (track.verdict is not None and track.verdict.is_moving)
-            self._classified.append(
-                ClassificationRecord(
-                    frame=frame.index,
-                    instance_id=actors[instance].instance_id,
-                    is_moving=actors[instance].is_moving,
-                    is_flagged=flagged,
-                )
-            )
-        followed = {t.track_id: matches[t.detection_index] if t.detection_index is not None else None for t in tracks}
-        self._identities.append(
-            FrameIdentities(
-                instances=tuple(
-                    a.instance_id for a in truth.objects if a.class_name in CLASSES and a.visible_pixels >= MIN_PIXELS
-                ),
-                tracks=tuple((t.track_id, followed[t.track_id]) for t in tracks if t.misses == 0),
-            )
-        )
         for track in tracks:
-            actor = actors.get(followed[track.track_id] or 0)
+            instance = None if track.detection_index is None else matches[track.detection_index]
+            actor = None if instance is None else actors.get(instance)
             if actor is not None:
-                self._beliefs.append(_sample(track, actor))
+                self._beliefs.append(_sample(frame.index, track, actor, truth.T_world_camera))
             folder.append("tracks.csv", TRACK_COLUMNS, self._track_row(frame.index, track, actor))
 
     def _track_row(self, frame: int, track: Track, actor: ObjectTruth | None) -> tuple[object, ...]:
@@ -181,55 +166,108 @@ class Judge:
             ekf=self._ekf_report(),
             tracking=self._tracking_report(),
             moc=self._moc_report(),
-            masks=MaskReport(iou=self._masks.iou, leak=self._masks.leak, waste=self._masks.waste),
+            masks=MaskReport(
+                iou=self._masks.iou,
+                boundary_f=self._masks.boundary_f,
+                leak=self._masks.leak,
+                waste=self._masks.waste,
+            ),
             time_ms=StageTimes(**{stage: 1e3 * float(np.mean(s)) for stage, s in self._seconds.items()}),
         )
 
     def _ekf_report(self) -> EkfReport:
-        if not self._beliefs:
-            return EkfReport()
-        errors = filter_errors(
-            np.array([b.mean for b in self._beliefs]),
-            np.array([b.covariance for b in self._beliefs]),
-            np.array([b.centre_world for b in self._beliefs]),
-            np.array([b.velocity_world for b in self._beliefs]),
-            np.array([b.ideal_world for b in self._beliefs]),
-            np.array([b.nis for b in self._beliefs]),
-        )
+        figures = asdict(filter_errors(self._beliefs))
+        del figures["samples"]
+        whiteness = innovation_whiteness(self._beliefs)
         return EkfReport(
-            position_rmse_m=errors.position_rmse_m,
-            position_rmse_ideal_m=errors.position_rmse_ideal_m,
-            velocity_rmse_m_s=errors.velocity_rmse_m_s,
-            nees=errors.nees,
-            nis=errors.nis,
+            **figures,
+            innovation_correlation=None if whiteness is None else whiteness.correlation,
+            innovation_correlation_bound=None if whiteness is None else whiteness.bound,
         )
 
     def _tracking_report(self) -> TrackingReport:
         if not self._identities:
             return TrackingReport()
-        scores = identity_scores(self._identities)
-        return TrackingReport(mota=scores.mota, idf1=scores.idf1, switches=scores.switches)
+        clear, hota = clear_scores(self._identities), hota_scores(self._identities)
+        return TrackingReport(
+            mota=clear.mota,
+            idf1=idf1(self._identities),
+            hota=None if hota is None else hota.hota,
+            deta=None if hota is None else hota.detection,
+            assa=None if hota is None else hota.association,
+            switches=clear.switches,
+        )
 
     def _moc_report(self) -> MocReport:
         if not self._classified:
             return MocReport()
-        scores = classification_scores(self._classified)
+        counts, latencies = confusion(self._classified), latency_scores(self._classified)
+        by_class: dict[str, list[ClassificationRecord]] = defaultdict(list)
+        for record in self._classified:
+            by_class[record.class_name].append(record)
+        tracked = [(r.speed_m_s, r.is_moving) for r in self._classified if r.speed_m_s is not None]
+        curve = roc(np.array([speed for speed, _ in tracked]), np.array([moves for _, moves in tracked], np.bool_))
         return MocReport(
-            precision=scores.precision,
-            recall=scores.recall,
-            flag_latency_frames=scores.flag_latency_frames,
-            unflag_latency_frames=scores.unflag_latency_frames,
+            precision=counts.precision,
+            recall=counts.recall,
+            idle_flag_rate=counts.idle_flag_rate,
+            auc=None if curve is None else curve.auc,
+            flag_latency_frames=latencies.flag_median_frames,
+            unflag_latency_frames=latencies.unflag_median_frames,
+            starts=latencies.starts,
+            missed_starts=latencies.missed_starts,
+            start_latency_frames=latencies.start_median_frames,
+            start_latency_max_frames=latencies.start_max_frames,
+            by_class={name: ConfusionReport(**asdict(confusion(by_class[name]))) for name in sorted(by_class)},
         )
 
 
-def _sample(track: Track, actor: ObjectTruth) -> BeliefSample:
+def _classified(
+    truth: GroundTruth, result: FrameResult, matches: Sequence[int | None]
+) -> Iterator[ClassificationRecord]:
+    """The answer about every true object that a detection was matched to."""
+    actors = {actor.instance_id: actor for actor in truth.objects}
+    by_detection = {t.detection_index: t for t in result.front_end.tracks if t.detection_index is not None}
+    for index, instance in enumerate(matches):
+        if instance is None or instance not in actors:
+            continue
+        track = by_detection.get(index)
+        verdict = None if track is None else track.verdict
+        yield ClassificationRecord(
+            frame=result.frame.index,
+            instance_id=instance,
+            class_name=actors[instance].class_name,
+            is_moving=actors[instance].is_moving,
+            true_speed_m_s=float(np.linalg.norm(actors[instance].velocity_world)),
+            # What has no track is masked by the pipeline, hence answered as moving.
+            is_flagged=verdict is None or verdict.is_moving,
+            speed_m_s=None if verdict is None else verdict.speed_m_s,
+        )
+
+
+def _identities(truth: GroundTruth, tracks: Sequence[Track], ious: FloatArray) -> FrameIdentities:
+    """The objects that a tracker should have, the tracks that were seen in this frame, and how well they fit."""
+    wanted = [a.instance_id for a in truth.objects if a.class_name in CLASSES and a.visible_pixels >= MIN_PIXELS]
+    seen = {track.track_id: track.detection_index for track in tracks if track.detection_index is not None}
+    return FrameIdentities(
+        instances=tuple(wanted),
+        tracks=tuple(seen),
+        similarity=ious[np.ix_(np.array(list(seen.values()), np.intp), np.array(wanted, np.intp))].T,
+    )
+
+
+def _sample(frame: int, track: Track, actor: ObjectTruth, T_world_camera: FloatArray) -> BeliefSample:
     return BeliefSample(
+        frame=frame,
+        track_id=track.track_id,
+        instance_id=actor.instance_id,
         mean=track.mean,
         covariance=track.covariance,
+        innovation=track.innovation,
         centre_world=actor.centre_world,
         velocity_world=actor.velocity_world,
-        ideal_world=actor.ideal_world if actor.ideal_world is not None else np.full(3, np.nan),
-        nis=track.innovation.nis if track.innovation is not None else np.nan,
+        ideal_world=actor.ideal_world,
+        T_world_camera=T_world_camera,
     )
 
 

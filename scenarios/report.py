@@ -3,7 +3,8 @@
 import operator
 import re
 from collections.abc import Callable
-from typing import Annotated
+from types import NoneType
+from typing import Annotated, get_args
 
 from pydantic import BaseModel, ConfigDict, Field
 from rich.box import SIMPLE
@@ -32,37 +33,104 @@ class LoopReport(Part):
 class EkfReport(Part):
     """Errors of the tracker's beliefs, over all frames in which a track was observed.
 
+    A bias is the part of the error that stays when it is averaged over each object's frames in the camera's axes; the
+    rest, the spread, is `sqrt(rmse² - bias²)`. Bounds hold a consistent filter's figure with probability 0.95.
+
     Attributes:
         position_rmse_m: against the true centre of the object.
+        position_bias_m: of the same error.
+        position_bias_ray_m: mean of the same error along the ray from the camera to the centre: below 0, the belief is
+            too near.
         position_rmse_ideal_m: against what the estimator's own observation gives on perfect images.
+        position_bias_ideal_m: of the same error.
         velocity_rmse_m_s: against the velocity of the centre.
+        velocity_bias_m_s: of the same error.
         nees: mean normalised estimation error squared of position and velocity against the centre; 6 if consistent.
+        nees_bounds: of nees.
+        nees_ideal: of the position against what the estimator's own observation gives on perfect images; 3 if
+            consistent.
         nis: mean normalised innovation squared; 3 if consistent.
+        nis_bounds: of nis.
+        innovation_correlation: autocorrelation at lag 1 of the normalised innovations; 0 if white.
+        innovation_correlation_bound: of its magnitude.
     """
 
     position_rmse_m: Measured = None
+    position_bias_m: Measured = None
+    position_bias_ray_m: Measured = None
     position_rmse_ideal_m: Measured = None
+    position_bias_ideal_m: Measured = None
     velocity_rmse_m_s: Measured = None
+    velocity_bias_m_s: Measured = None
     nees: Measured = None
+    nees_bounds: tuple[float, float] | None = None
+    nees_ideal: Measured = None
     nis: Measured = None
+    nis_bounds: tuple[float, float] | None = None
+    innovation_correlation: Measured = None
+    innovation_correlation_bound: Measured = None
 
 
 class TrackingReport(Part):
-    """Multi-object tracking scores."""
+    """Multi-object tracking scores.
+
+    Attributes:
+        mota: CLEAR-MOT accuracy.
+        idf1: share of right identities.
+        hota: mean over 19 thresholds of IoU of the geometric mean of detection and association accuracy.
+        deta: detection accuracy, mean over the thresholds.
+        assa: association accuracy, mean over the thresholds.
+        switches: times that an object's track changed.
+    """
 
     mota: Measured = None
     idf1: Measured = None
     hota: Measured = None
+    deta: Measured = None
+    assa: Measured = None
     switches: int | None = None
 
 
+class ConfusionReport(Part):
+    """How often an object in a frame was what, and called what; positive = moving."""
+
+    true_positive: int
+    false_positive: int
+    false_negative: int
+    true_negative: int
+
+
 class MocReport(Part):
-    """Moving object classification; latencies are medians in frames."""
+    """Moving object classification, over all seen objects of interest and frames.
+
+    Motions and rests shorter than 10 frames begin nothing that a latency would count from.
+
+    Attributes:
+        precision: share of flagged objects that move.
+        recall: share of moving objects that are flagged.
+        idle_flag_rate: share of resting objects that are flagged.
+        auc: area under the ROC curve of the tracks' speeds: what the best choice of threshold has to work with.
+        flag_latency_frames: median, from the beginning of a motion or the appearance of a mover to its first flag.
+        unflag_latency_frames: median, from the beginning of a rest or the appearance of a resting object to its first
+            frame without flag.
+        starts: times that an object sets off (its centre, above 0.1 m/s) that was tracked, at rest and not flagged.
+        missed_starts: those of them that were never flagged.
+        start_latency_frames: median over the flagged starts.
+        start_latency_max_frames: the longest of them.
+        by_class: counts for each class.
+    """
 
     precision: Measured = None
     recall: Measured = None
+    idle_flag_rate: Measured = None
+    auc: Measured = None
     flag_latency_frames: Measured = None
     unflag_latency_frames: Measured = None
+    starts: int | None = None
+    missed_starts: int | None = None
+    start_latency_frames: Measured = None
+    start_latency_max_frames: int | None = None
+    by_class: dict[str, ConfusionReport] | None = None
 
 
 class MaskReport(Part):
@@ -70,11 +138,13 @@ class MaskReport(Part):
 
     Attributes:
         iou: mean over the matched detections.
+        boundary_f: mean F-score of their contours within 0.8 % of the image's diagonal, in every fifth frame.
         leak: share of the moving objects' pixels that odometry still sees.
         waste: share of the static pixels that odometry lost.
     """
 
     iou: Measured = None
+    boundary_f: Measured = None
     leak: Measured = None
     waste: Measured = None
 
@@ -238,6 +308,8 @@ def expectation(text: str, methods: tuple[str, ...]) -> Expectation:
             model = inner
             if depth == len(parts) - 1:
                 raise ScenarioError(f"--expect {text}: name one of {part}: {', '.join(inner.model_fields)}")
+        elif not _is_number(inner):
+            raise ScenarioError(f"--expect {text}: '{part}' is not one number")
         elif depth < len(parts) - 1:
             raise ScenarioError(f"--expect {text}: '{part}' has no parts")
     if not parts:
@@ -247,3 +319,7 @@ def expectation(text: str, methods: tuple[str, ...]) -> Expectation:
     except ValueError:
         raise ScenarioError(f"--expect {text}: '{number}' is no number") from None
     return Expectation(text=text, method=method, path=tuple(parts), sign=sign, bound=bound)
+
+
+def _is_number(annotation: object) -> bool:
+    return set(get_args(annotation) or (annotation,)) <= {int, float, NoneType}

@@ -1,1 +1,1 @@
-"""Metrics on plain arrays: trajectory, tracking, classification, masks."""
+"""Metrics on plain arrays and small records: trajectory, matching, identities, filter, classification, masks."""

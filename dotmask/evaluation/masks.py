@@ -1,4 +1,4 @@
-"""Judges the masks: overlap with the truth, what leaks into odometry and what is wasted."""
+"""Judges the masks: overlap and outline against the truth, what leaks into odometry and what is wasted."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from dotmask.records import DepthImage, MaskImage
+from dotmask.evaluation.contours import boundary_f
+from dotmask.records import DepthImage, FloatArray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -20,6 +21,8 @@ class MaskCounts:
         wasted_pixels: those of them without depth in the MO-MDI.
         iou_sum: sum of the IoU of the matched detections with their instances.
         matched_detections: number of terms in it.
+        boundary_f_sum: sum of the boundary F-score of matched detections.
+        outlined_detections: number of terms in it.
     """
 
     moving_pixels: int = 0
@@ -28,6 +31,8 @@ class MaskCounts:
     wasted_pixels: int = 0
     iou_sum: float = 0.0
     matched_detections: int = 0
+    boundary_f_sum: float = 0.0
+    outlined_detections: int = 0
 
     def __add__(self, other: "MaskCounts") -> "MaskCounts":
         """Counts of both."""
@@ -38,6 +43,8 @@ class MaskCounts:
             wasted_pixels=self.wasted_pixels + other.wasted_pixels,
             iou_sum=self.iou_sum + other.iou_sum,
             matched_detections=self.matched_detections + other.matched_detections,
+            boundary_f_sum=self.boundary_f_sum + other.boundary_f_sum,
+            outlined_detections=self.outlined_detections + other.outlined_detections,
         )
 
     @property
@@ -54,6 +61,11 @@ class MaskCounts:
     def iou(self) -> float | None:
         """Mean IoU of the matched detections; None without any."""
         return self.iou_sum / self.matched_detections if self.matched_detections else None
+
+    @property
+    def boundary_f(self) -> float | None:
+        """Mean boundary F-score of the detections whose outline was judged; None without any."""
+        return self.boundary_f_sum / self.outlined_detections if self.outlined_detections else None
 
 
 def count_masking(
@@ -84,25 +96,30 @@ def count_masking(
     )
 
 
-def count_overlap(
+def count_overlap(ious: FloatArray, matches: Sequence[int | None]) -> MaskCounts:
+    """IoU of the detections with the instances they were matched to.
+
+    Args:
+        ious: (N, M) of each detection with each instance (see dotmask.evaluation.matching.mask_ious).
+        matches: for each detection its instance, or None (see dotmask.evaluation.matching.match_detections).
+    """
+    overlaps = [float(row[instance]) for row, instance in zip(ious, matches, strict=True) if instance is not None]
+    return MaskCounts(iou_sum=sum(overlaps), matched_detections=len(overlaps))
+
+
+def count_outlines(
     masks: npt.NDArray[np.bool_], instance_ids: npt.NDArray[np.uint16], matches: Sequence[int | None]
 ) -> MaskCounts:
-    """IoU of the detections with the instances they were matched to.
+    """Boundary F-score of the detections with the instances they were matched to.
 
     Args:
         masks: (N, H, W) detected.
         instance_ids: (H, W) true instance of each pixel.
-        matches: for each detection its instance, or None (see dotmask.evaluation.tracking.match_detections).
+        matches: as for `count_overlap`.
     """
-    overlaps = [
-        intersection_over_union(mask, instance_ids == instance)
+    scores = [
+        boundary_f(mask, instance_ids == instance)
         for mask, instance in zip(masks, matches, strict=True)
         if instance is not None
     ]
-    return MaskCounts(iou_sum=float(sum(overlaps)), matched_detections=len(overlaps))
-
-
-def intersection_over_union(first: MaskImage, second: MaskImage) -> float:
-    """IoU of two masks (H, W); 0 where both are empty."""
-    union = int(np.count_nonzero(first | second))
-    return int(np.count_nonzero(first & second)) / union if union else 0.0
+    return MaskCounts(boundary_f_sum=sum(scores), outlined_detections=len(scores))

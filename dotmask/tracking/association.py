@@ -9,8 +9,9 @@ from scipy.optimize import linear_sum_assignment
 from scipy.special import gammaincinv
 
 from dotmask.geometry import inverse, transform
+from dotmask.mask_geometry import intersection_over_union, moved_mask
 from dotmask.profiles import Profile
-from dotmask.records import FloatArray, Observation, Track
+from dotmask.records import FloatArray, Intrinsics, Observation, Track
 
 _FORBIDDEN = 1e9
 """Above any gated distance: the assignment first pairs as many as it can, then at the least sum of distances."""
@@ -31,7 +32,7 @@ class Association:
     unmatched_observations: tuple[int, ...]
 
 
-Associate = Callable[[Sequence[Track], Sequence[Observation], FloatArray, Profile], Association]
+Associate = Callable[[Sequence[Track], Sequence[Observation], FloatArray, Intrinsics, Profile], Association]
 """The form of `associate`."""
 
 
@@ -58,14 +59,22 @@ def squared_mahalanobis(
 
 
 def associate(
-    tracks: Sequence[Track], observations: Sequence[Observation], T_world_camera: FloatArray, profile: Profile
+    tracks: Sequence[Track],
+    observations: Sequence[Observation],
+    T_world_camera: FloatArray,
+    intrinsics: Intrinsics,
+    profile: Profile,
 ) -> Association:
     """Pair predicted tracks with observations of the same class inside the gate, at the least total distance.
+
+    Where the gate holds more than one candidate, the overlap of the masks has a say: the IoU of the track's last mask,
+    moved to where the track is predicted, with the observation's mask counts as a likelihood.
 
     Args:
         tracks: predicted to the time of the frame.
         observations: of that frame.
         T_world_camera: (4, 4) the frame's camera pose.
+        intrinsics: of the camera.
         profile: gives the gate.
     """
     pairs: tuple[tuple[int, int], ...] = ()
@@ -73,6 +82,19 @@ def associate(
         cost = squared_mahalanobis(tracks, observations, T_world_camera)
         is_same_class = np.array([[t.class_name == o.class_name for o in observations] for t in tracks])
         is_allowed = is_same_class & (cost <= chi_square_quantile(profile.gate_probability, 3))
+        rivals = is_allowed & ((is_allowed.sum(axis=0) > 1)[None] | (is_allowed.sum(axis=1) > 1)[:, None])
+        if profile.least_mask_likelihood < 1 and rivals.any():
+            T_camera_world = inverse(T_world_camera)
+            for i in map(int, np.flatnonzero(rivals.any(axis=1))):
+                expected = moved_mask(
+                    tracks[i].mask,
+                    tracks[i].mask_position_camera,
+                    transform(T_camera_world, tracks[i].position_world),
+                    intrinsics,
+                )
+                for j in map(int, np.flatnonzero(rivals[i])):
+                    iou = intersection_over_union(expected, observations[j].mask)
+                    cost[i, j] -= 2.0 * np.log(max(iou, profile.least_mask_likelihood))
         rows, columns = linear_sum_assignment(np.where(is_allowed, cost, _FORBIDDEN))
         pairs = tuple((int(i), int(j)) for i, j in zip(rows, columns, strict=True) if is_allowed[i, j])
     seen_tracks = {i for i, _ in pairs}

@@ -12,9 +12,10 @@ import numpy as np
 
 from dotmask.geometry import inverse, transform
 from dotmask.profiles import Profile
-from dotmask.records import Detections, FloatArray, Innovation, MeasurementModel, Observation, Track
+from dotmask.records import FloatArray, Innovation, MeasurementModel, Observation, SurfaceMotion, Track, TrackPhase
 
 _IDENTITY = np.eye(6)
+_VELOCITY = _IDENTITY[3:]
 
 
 def measurement_jacobian(p_camera: FloatArray, model: MeasurementModel, T_world_camera: FloatArray) -> FloatArray:
@@ -26,7 +27,6 @@ def measurement_jacobian(p_camera: FloatArray, model: MeasurementModel, T_world_
 
 def initiate(
     observation: Observation,
-    detections: Detections,
     timestamp_s: float,
     T_world_camera: FloatArray,
     profile: Profile,
@@ -48,11 +48,13 @@ def initiate(
         timestamp_s=timestamp_s,
         mean=mean,
         covariance=0.5 * (covariance + covariance.T),
-        age_frames=1,
+        hits=1,
         misses=0,
+        phase=TrackPhase.CONFIRMED if profile.confirming_hits == 1 else TrackPhase.TENTATIVE,
         detection_index=observation.detection_index,
-        mask=detections.masks[observation.detection_index],
+        mask=observation.mask,
         mask_timestamp_s=timestamp_s,
+        mask_position_camera=observation.position_camera,
         partial_timestamp_s=timestamp_s,
     )
 
@@ -64,27 +66,59 @@ def innovate(track: Track, observation: Observation, T_world_camera: FloatArray)
     return _innovation(track, observation, p_camera, H)
 
 
-def update(track: Track, observation: Observation, detections: Detections, T_world_camera: FloatArray) -> Track:
+def update(
+    track: Track,
+    observation: Observation,
+    surface: SurfaceMotion | None,
+    T_world_camera: FloatArray,
+    profile: Profile,
+) -> Track:
     """The belief after `observation`, for a track that was predicted to its frame.
 
     `K = P Hᵀ S⁻¹` is 6x3 (printed 3x3 in the paper). The covariance is updated in Joseph form, which stays symmetric
     and positive definite under rounding, where the paper's `(I - K H) P` need not.
+
+    Args:
+        track: predicted.
+        observation: of its position.
+        surface: how its surface moves: a measurement of the velocity, `H = [0 I]`; None: there is none (paper).
+        T_world_camera: (4, 4) camera pose at the frame.
+        profile: says when a track is confirmed.
     """
-    p_camera = transform(inverse(T_world_camera), track.position_world)
+    T_camera_world = inverse(T_world_camera)
+    p_camera = transform(T_camera_world, track.position_world)
     H = measurement_jacobian(p_camera, observation.model, T_world_camera)
     innovation = _innovation(track, observation, p_camera, H)
-    mean, covariance = _corrected(track, innovation, H, observation.covariance)
+    mean, P = _corrected(track.mean, track.covariance, innovation, H, observation.covariance)
+    if surface is not None:
+        residual, S = surface.velocity_world - mean[3:], P[3:, 3:] + surface.covariance
+        velocity = Innovation(residual=residual, covariance=S)
+        mean, P = _corrected(mean, P, velocity, _VELOCITY, surface.covariance)
+    hits = track.hits + 1
     return replace(
         track,
         mean=mean,
-        covariance=covariance,
+        covariance=P,
+        hits=hits,
         misses=0,
+        phase=TrackPhase.CONFIRMED
+        if track.phase is not TrackPhase.TENTATIVE or hits >= profile.confirming_hits
+        else TrackPhase.TENTATIVE,
         detection_index=observation.detection_index,
-        mask=detections.masks[observation.detection_index],
+        mask=observation.mask,
         mask_timestamp_s=track.timestamp_s,
+        mask_position_camera=transform(T_camera_world, mean[:3]),
         partial_timestamp_s=track.timestamp_s if observation.is_partial else track.partial_timestamp_s,
         innovation=innovation,
+        surface=surface,
     )
+
+
+def slide(track: Track, variance_m2: float) -> Track:
+    """`track` with a less certain position: the point that is measured may have slid over the object."""
+    P = track.covariance.copy()
+    P[:3, :3] += variance_m2 * np.eye(3)
+    return replace(track, covariance=P)
 
 
 def _innovation(track: Track, observation: Observation, p_camera: FloatArray, H: FloatArray) -> Innovation:
@@ -95,10 +129,11 @@ def _innovation(track: Track, observation: Observation, p_camera: FloatArray, H:
     )
 
 
-def _corrected(track: Track, innovation: Innovation, H: FloatArray, R: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _corrected(
+    mean: FloatArray, P: FloatArray, innovation: Innovation, H: FloatArray, R: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Mean (6,) and covariance (6, 6) after an innovation."""
-    P = track.covariance
     K = np.linalg.solve(innovation.covariance, H @ P).T
     rest = _IDENTITY - K @ H
     covariance = rest @ P @ rest.T + K @ R @ K.T
-    return track.mean + K @ innovation.residual, 0.5 * (covariance + covariance.T)
+    return mean + K @ innovation.residual, 0.5 * (covariance + covariance.T)

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dotmask.geometry import back_project
-from dotmask.profiles import ClassModel, Profile
+from dotmask.profiles import Profile
 from dotmask.records import DepthImage, Detections, FloatArray, Intrinsics, MaskImage, Observation, RgbdFrame
 from dotmask.tracking.measurement_model import CAMERA_POINT, PixelDepth
 from dotmask.tracking.measurement_noise import (
@@ -28,8 +28,6 @@ _MEDIAN_PIXELS = 3000
 _LEAST_DEPTH_M, _MOST_DEPTH_M = 1e-6, 1e6
 _OTHER_MARGIN_M = 0.02
 """How much nearer another detection must be to count as an occluder."""
-_LEAST_MISSING = 0.1
-"""A hidden side always widens R by at least this share of the object's extent."""
 
 
 class _Crop(NamedTuple):
@@ -56,7 +54,7 @@ def observe(detections: Detections, frame: RgbdFrame, profile: Profile) -> tuple
     detection with fewer than `profile.min_depth_pixels` pixels of valid depth gives no observation.
     """
     observations = []
-    labels = _label(detections, frame.intrinsics) if profile.noise.inflates_hidden_sides else None
+    labels = _label(detections, frame.intrinsics) if profile.noise.notices_hidden_sides else None
     model = PixelDepth(intrinsics=frame.intrinsics) if profile.measurement == "pixel_depth" else CAMERA_POINT
     for index, class_name in enumerate(detections.class_names):
         box = detections.boxes_px[index]
@@ -69,17 +67,16 @@ def observe(detections: Detections, frame: RgbdFrame, profile: Profile) -> tuple
         depth, depth_variance = depth_seen
         p_camera = back_project(centre[None], np.array([depth]), frame.intrinsics)[0]
         class_model = profile.class_model(class_name)
-        missing = (0.0, 0.0)
+        is_partial = False
         if labels is not None:
             view = _View(index + 1, labels, frame.depth_m, profile.noise.occluder_margin_m + 0.02 * depth**2)
-            missing = _missing_extent(view, box, crop, depth, class_model, frame.intrinsics)
+            is_partial = _is_partial(view, crop, frame.intrinsics)
         observations.append(
             Observation(
                 position_camera=p_camera,
                 covariance=measurement_covariance(
                     p_camera,
                     np.array([*centre_variance, depth_variance]),
-                    missing,
                     model,
                     class_model,
                     frame.intrinsics,
@@ -87,8 +84,9 @@ def observe(detections: Detections, frame: RgbdFrame, profile: Profile) -> tuple
                 ),
                 class_name=class_name,
                 detection_index=index,
+                mask=detections.masks[index],
                 model=model,
-                is_partial=missing != (0.0, 0.0),
+                is_partial=is_partial,
             )
         )
     return tuple(observations)
@@ -168,38 +166,20 @@ def _label(detections: Detections, intrinsics: Intrinsics) -> npt.NDArray[np.uin
     return labels
 
 
-def _missing_extent(
-    view: _View, box_px: FloatArray, crop: _Crop, distance_m: float, model: ClassModel, intrinsics: Intrinsics
-) -> tuple[float, float]:
-    """Width and height (m) that hidden sides may hide: the class's extent less what is seen; 0 where none is hidden."""
+def _is_partial(view: _View, crop: _Crop, intrinsics: Intrinsics) -> bool:
+    """Whether the image border, or something nearer, hides a side of the object."""
     u0, u1, v0, v1 = crop
+    if u0 <= 1 or v0 <= 1 or u1 >= intrinsics.width - 1 or v1 >= intrinsics.height - 1:
+        return True
     rows, columns = slice(v0, v1, 1 + (v1 - v0) // _LINES), slice(u0, u1, 1 + (u1 - u0) // _LINES)
-    low_u, high_u = slice(max(u0 - _BAND_PX, 0), u0 + _RIM_PX), slice(max(u1 - _RIM_PX, 0), u1 + _BAND_PX)
-    low_v, high_v = slice(max(v0 - _BAND_PX, 0), v0 + _RIM_PX), slice(max(v1 - _RIM_PX, 0), v1 + _BAND_PX)
-    is_hidden_u = (
-        u0 <= 1
-        or u1 >= intrinsics.width - 1
-        or _ends_behind_occluder(view, (rows, low_u), across_columns=True, is_high=False)
-        or _ends_behind_occluder(view, (rows, high_u), across_columns=True, is_high=True)
+    left, right = slice(max(u0 - _BAND_PX, 0), u0 + _RIM_PX), slice(u1 - _RIM_PX, u1 + _BAND_PX)
+    top, bottom = slice(max(v0 - _BAND_PX, 0), v0 + _RIM_PX), slice(v1 - _RIM_PX, v1 + _BAND_PX)
+    return (
+        _ends_behind_occluder(view, (rows, left), across_columns=True, is_high=False)
+        or _ends_behind_occluder(view, (rows, right), across_columns=True, is_high=True)
+        or _ends_behind_occluder(view, (top, columns), across_columns=False, is_high=False)
+        or _ends_behind_occluder(view, (bottom, columns), across_columns=False, is_high=True)
     )
-    is_hidden_v = (
-        v0 <= 1
-        or v1 >= intrinsics.height - 1
-        or _ends_behind_occluder(view, (low_v, columns), across_columns=False, is_high=False)
-        or _ends_behind_occluder(view, (high_v, columns), across_columns=False, is_high=True)
-    )
-    seen = (
-        float(box_px[2] - box_px[0] + 1) * distance_m / intrinsics.fx,
-        float(box_px[3] - box_px[1] + 1) * distance_m / intrinsics.fy,
-    )
-    if not (is_hidden_u or is_hidden_v):
-        return 0.0, 0.0
-    # What hides the left of a person may hide the head as well, though the box ends at the shoulder by itself.
-    width, height = (
-        max(extent - s, _LEAST_MISSING * extent if is_hidden else 0.0)
-        for extent, s, is_hidden in zip(model.extent_m, seen, (is_hidden_u, is_hidden_v), strict=False)
-    )
-    return width, height
 
 
 def _ends_behind_occluder(view: _View, strip: tuple[slice, slice], *, across_columns: bool, is_high: bool) -> bool:

@@ -1,4 +1,4 @@
-"""R of an observation: the sensor, the camera's pose, the changing shape, and what is hidden.
+"""R of an observation: the sensor, the camera's pose and the changing shape.
 
 The paper calls R's diagonal "the imprecision of the RGB-D camera" and gives no values (Tracking Using EKF, Update).
 Here the sensor's part follows from how a position is computed from many pixels:
@@ -85,7 +85,6 @@ def median_depth_variance(depth_m: float, pixels: int, noise: MeasurementNoise) 
 def measurement_covariance(
     p_camera: FloatArray,
     sensor_variance: FloatArray,
-    missing_m: tuple[float, float],
     model: MeasurementModel,
     class_model: ClassModel,
     intrinsics: Intrinsics,
@@ -96,18 +95,13 @@ def measurement_covariance(
     Args:
         p_camera: (3,) where the object is seen, metres.
         sensor_variance: (3,) of u and v (px²) and of the depth (m²) that `p_camera` was computed from.
-        missing_m: width and height of what a hidden side may hide; 0 where the object ends by itself.
         model: what is measured.
-        class_model: how much the shape of the class changes, and its extent.
+        class_model: how much the shape of the class changes.
         intrinsics: of the camera.
         noise: see MeasurementNoise.
     """
     sensor = np.diag(sensor_variance)
-    # The centre of what is seen lies half of what is hidden away from the centre of the whole.
-    share = max((m / e for m, e in zip(missing_m, class_model.extent_m, strict=False) if e > 0), default=0.0)
-    offsets = (0.5 * missing_m[0], 0.5 * missing_m[1], noise.hidden_depth_share * share * class_model.extent_m[2])
-    hidden = class_model.hidden_factor * np.array(offsets)
-    shape = np.diag(np.array(class_model.shape_sigma_m) ** 2 + hidden**2)
+    shape = np.diag(np.array(class_model.shape_sigma_m) ** 2)
     metric = shape + _pose_covariance(p_camera, noise)
     if isinstance(model, PixelDepth):
         J = model.jacobian(p_camera)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from dotmask.profiles import Profile
-from dotmask.records import FloatArray, Track
+from dotmask.records import FloatArray, Track, TrackPhase
 
 _ROWS, _COLUMNS = np.arange(3), np.arange(3, 6)
 
@@ -37,7 +37,9 @@ def process_noise(dt_s: float, acceleration_sigmas_m_s2: FloatArray) -> FloatArr
 def predict(track: Track, timestamp_s: float, profile: Profile) -> Track:
     """The belief about `track` at a later frame, before that frame is looked at.
 
-    It counts as unseen (one more miss) until an update says otherwise.
+    It counts as unseen (one more miss) until an update says otherwise. The position of a half hidden object is less
+    certain than the motion model says (`slide_variance`): the track follows what is seen, and the velocity is not
+    dragged along.
 
     Raises:
         ValueError: `timestamp_s` is not later than the belief.
@@ -47,15 +49,27 @@ def predict(track: Track, timestamp_s: float, profile: Profile) -> Track:
         raise ValueError(f"predict: frame at {timestamp_s} s is not later than the track's {track.timestamp_s} s")
     F = transition(dt_s)
     model = profile.class_model(track.class_name)
-    Q = process_noise(dt_s, model.acceleration_sigma_m_s2 * model.axis_shares)
-    P = F @ track.covariance @ F.T + Q
+    P = F @ track.covariance @ F.T + process_noise(dt_s, model.acceleration_sigma_m_s2 * model.axis_shares)
+    P = 0.5 * (P + P.T)
+    if track.is_partial:
+        P[_ROWS, _ROWS] += slide_variance(track, timestamp_s, profile)
     return replace(
         track,
         timestamp_s=timestamp_s,
         mean=F @ track.mean,
-        covariance=0.5 * (P + P.T),
-        age_frames=track.age_frames + 1,
+        covariance=P,
         misses=track.misses + 1,
+        phase=TrackPhase.TENTATIVE if track.phase is TrackPhase.TENTATIVE else TrackPhase.COASTING,
         detection_index=None,
         innovation=None,
+        surface=None,
     )
+
+
+def slide_variance(track: Track, timestamp_s: float, profile: Profile) -> float:
+    """How far, squared, the measured point of a half hidden object may slide over it until `timestamp_s`, per axis.
+
+    What is measured is the centre of the visible part, and more or less of the object shows from frame to frame.
+    """
+    sigma_m = profile.class_model(track.class_name).slide_sigma_m
+    return sigma_m**2 * (timestamp_s - track.timestamp_s)

@@ -11,8 +11,8 @@ from hypothesis.extra import numpy as hnp
 from scipy.spatial.transform import Rotation
 
 from dotmask.classification import classify, mask_iou
-from dotmask.evaluation.classification import ClassificationRecord, classification_scores
-from dotmask.evaluation.tracking import chi_square_mean_bounds, normalised_squares
+from dotmask.evaluation.classification import ClassificationRecord, confusion
+from dotmask.evaluation.filter import chi_square_mean_bounds, normalised_squares
 from dotmask.masking import mask_depth
 from dotmask.profiles import CALIBRATED, PAPER, PROFILES
 from dotmask.records import Detections, Intrinsics, MaskedDepth, Observation, RgbdFrame, Track
@@ -325,8 +325,18 @@ def test_walkers_are_flagged_and_standing_chairs_are_not(pictures, calibrated) -
         if not is_new:
             flagged = track.verdict.is_moving
             moving = instance in MOVING_IDS
-            records.append(ClassificationRecord(frame=k, instance_id=instance, is_moving=moving, is_flagged=flagged))
-    scores = classification_scores(records)
+            records.append(
+                ClassificationRecord(
+                    frame=k,
+                    instance_id=instance,
+                    class_name=track.class_name,
+                    is_moving=moving,
+                    true_speed_m_s=float(np.linalg.norm(pictures[k].velocities[instance])),
+                    is_flagged=flagged,
+                    speed_m_s=track.verdict.speed_m_s,
+                )
+            )
+    scores = confusion(records)
     assert scores.recall is not None
     assert scores.precision is not None
     assert scores.recall >= 0.95

@@ -1,49 +1,69 @@
+import numpy as np
 import pytest
+from scipy.stats import mannwhitneyu
 
-from dotmask.evaluation.classification import ClassificationRecord, classification_scores
-
-
-def history(truth: str, flags: str, instance_id=1, start=0):
-    """One letter per frame: M moving, F flagged, '-' neither, ' ' no record."""
-    return [
-        ClassificationRecord(
-            frame=start + k, instance_id=instance_id, is_moving=truth[k] == "M", is_flagged=flags[k] == "F"
-        )
-        for k in range(len(truth))
-        if truth[k] != " "
-    ]
+from dotmask.evaluation.classification import ClassificationRecord, Confusion, confusion, roc
 
 
-def test_precision_and_recall_by_hand() -> None:
-    scores = classification_scores(history("MMMM----", "FFF-F---"))
-    assert scores.precision == pytest.approx(3 / 4)
-    assert scores.recall == pytest.approx(3 / 4)
+def record(is_moving: bool, is_flagged: bool) -> ClassificationRecord:
+    return ClassificationRecord(
+        frame=0,
+        instance_id=1,
+        class_name="person",
+        is_moving=is_moving,
+        true_speed_m_s=0.0,
+        is_flagged=is_flagged,
+        speed_m_s=0.0,
+    )
 
 
-def test_latencies_count_from_the_change_of_the_truth() -> None:
-    scores = classification_scores(history("---MMMMMMM-----", "------FFFFFFFF-"))
-    assert scores.flag_latency_frames == 3
-    assert scores.unflag_latency_frames == pytest.approx((0 + 4) / 2)  # the rest at the start is answered at once
-    assert scores.unanswered == 0
-
-
-def test_an_object_that_appears_in_motion_counts_as_a_start() -> None:
-    records = history("MMM", "-FF", instance_id=1) + history("MMM", "---", instance_id=2)
-    scores = classification_scores(records)
-    assert (scores.flag_latency_frames, scores.unflag_latency_frames, scores.unanswered) == (1, None, 1)
-
-
-def test_a_gap_does_not_end_a_motion() -> None:
-    assert classification_scores(history("MM   MM", "--   FF")).flag_latency_frames == 5
-
-
-def test_order_of_the_records_does_not_matter() -> None:
-    records = history("--MMM--", "---FFF-") + history("MMMM", "--FF", instance_id=2)
-    assert classification_scores(records) == classification_scores(records[::-1])
+def test_confusion_by_hand() -> None:
+    counts = confusion(
+        [record(True, True)] * 4 + [record(False, True)] + [record(True, False)] * 2 + [record(False, False)] * 3
+    )
+    assert counts == Confusion(true_positive=4, false_positive=1, false_negative=2, true_negative=3)
+    assert counts.precision == pytest.approx(4 / 5)
+    assert counts.recall == pytest.approx(4 / 6)
+    assert counts.idle_flag_rate == pytest.approx(1 / 4)
 
 
 def test_nothing_measured_is_none() -> None:
-    scores = classification_scores([])
-    assert (scores.precision, scores.recall, scores.flag_latency_frames) == (None, None, None)
-    still = classification_scores(history("---", "---"))
-    assert (still.precision, still.recall, still.unflag_latency_frames) == (None, None, 0)
+    nothing = confusion([])
+    assert nothing.precision is nothing.recall is nothing.idle_flag_rate is None
+    still = confusion([record(False, False)])
+    assert (still.precision, still.recall, still.idle_flag_rate) == (None, None, 0.0)
+
+
+def test_roc_by_hand() -> None:
+    curve = roc(np.array([0.1, 0.4, 0.4, 0.8]), np.array([False, True, False, True]))
+    assert curve is not None
+    assert curve.thresholds == pytest.approx([np.inf, 0.8, 0.4, 0.1])
+    assert curve.true_positive_rate == pytest.approx([0, 0.5, 1, 1])
+    assert curve.false_positive_rate == pytest.approx([0, 0, 0.5, 1])
+    assert curve.auc == pytest.approx(3.5 / 4)  # of four pairs three in the right order, one tie
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_area_is_the_rank_statistic_and_rates_are_counts(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    is_moving = rng.random(200) < 0.3
+    scores = np.round(rng.gamma(1 + is_moving, 0.2), 2)  # with ties
+    curve = roc(scores, is_moving)
+    assert curve is not None
+    pairs = is_moving.sum() * (~is_moving).sum()
+    assert curve.auc == pytest.approx(mannwhitneyu(scores[is_moving], scores[~is_moving]).statistic / pairs)
+    for threshold, hit, false in zip(
+        curve.thresholds, curve.true_positive_rate, curve.false_positive_rate, strict=True
+    ):
+        called = scores >= threshold
+        assert hit == pytest.approx((called & is_moving).sum() / is_moving.sum())
+        assert false == pytest.approx((called & ~is_moving).sum() / (~is_moving).sum())
+
+
+def test_perfect_and_useless_scores() -> None:
+    is_moving = np.array([True, False, True, False])
+    perfect, useless = roc(is_moving.astype(float), is_moving), roc(np.zeros(4), is_moving)
+    assert perfect is not None
+    assert useless is not None
+    assert (perfect.auc, useless.auc) == (1.0, 0.5)
+    assert roc(np.zeros(2), np.array([True, True])) is None

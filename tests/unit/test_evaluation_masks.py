@@ -1,7 +1,9 @@
 import numpy as np
 import pytest
 
-from dotmask.evaluation.masks import MaskCounts, count_masking, count_overlap, intersection_over_union
+from dotmask.evaluation.contours import boundary_f
+from dotmask.evaluation.masks import MaskCounts, count_masking, count_outlines, count_overlap
+from dotmask.evaluation.matching import mask_ious
 
 IDS = np.zeros((10, 10), np.uint16)
 IDS[:, :3], IDS[:, 3:5] = 4, 9  # 30 pixels of instance 4, 20 of instance 9, 50 of background
@@ -29,7 +31,7 @@ def test_pixels_without_depth_are_neither_leaked_nor_wasted() -> None:
 def test_movers_out_of_view_and_none_at_all() -> None:
     assert count_masking(DEPTH, DEPTH, IDS, [400]).leak is None
     nothing = count_masking(DEPTH, DEPTH, IDS, [])
-    assert (nothing.leak, nothing.waste, nothing.iou) == (None, 0.0, None)
+    assert (nothing.leak, nothing.waste, nothing.iou, nothing.boundary_f) == (None, 0.0, None, None)
 
 
 def test_counts_add_up() -> None:
@@ -39,10 +41,12 @@ def test_counts_add_up() -> None:
     assert total.waste == pytest.approx(0.5)
 
 
-def test_overlap_of_the_matched_detections() -> None:
+def test_overlap_and_outline_of_the_matched_detections() -> None:
     exact, half = IDS == 4, IDS == 9
     half = half & (np.arange(10)[:, None] < 5)
-    counts = count_overlap(np.array([exact, half, exact]), IDS, (4, 9, None))
-    assert counts.matched_detections == 2
+    masks, matches = np.array([exact, half, exact]), (4, 9, None)
+    counts = count_overlap(mask_ious(masks, IDS), matches) + count_outlines(masks, IDS, matches)
+    assert (counts.matched_detections, counts.outlined_detections) == (2, 2)
     assert counts.iou == pytest.approx(0.75)
-    assert intersection_over_union(exact & False, exact & False) == 0.0
+    assert counts.boundary_f == pytest.approx((1 + boundary_f(half, IDS == 9)) / 2)
+    assert counts.boundary_f < 1

@@ -5,7 +5,18 @@ import pytest
 from rich.console import Console
 
 from scenarios.errors import ScenarioError
-from scenarios.report import MethodReport, MocReport, Report, StageTimes, WorldTimes, expectation, table
+from scenarios.report import (
+    ConfusionReport,
+    EkfReport,
+    MethodReport,
+    MocReport,
+    Report,
+    StageTimes,
+    TrackingReport,
+    WorldTimes,
+    expectation,
+    table,
+)
 
 METHODS = ("unmasked", "dotmask")
 
@@ -21,6 +32,17 @@ def method(ate: float | None, **more: object) -> MethodReport:
     )
 
 
+DOTMASK = method(
+    0.0123,
+    ekf=EkfReport(nees_bounds=(5.5, 6.5)),
+    tracking=TrackingReport(hota=0.95),
+    moc=MocReport(
+        precision=0.95,
+        start_latency_max_frames=2,
+        by_class={"person": ConfusionReport(true_positive=5, false_positive=0, false_negative=1, true_negative=2)},
+    ),
+)
+
 REPORT = Report(
     scenario="smoke",
     seed=0,
@@ -30,7 +52,7 @@ REPORT = Report(
     slam="embedded",
     profile="paper",
     frame_hash="ab" * 32,
-    methods={"unmasked": method(0.2), "dotmask": method(0.0123, moc=MocReport(precision=0.95))},
+    methods={"unmasked": method(0.2), "dotmask": DOTMASK},
     time_ms=WorldTimes(render=20.0),
 )
 
@@ -48,10 +70,17 @@ def test_report_json_follows_the_contract() -> None:
         "ate_rmse_m", "rpe_trans_rmse_m", "rpe_rot_rmse_rad", "tracked_frames", "loops", "ekf", "tracking", "moc",
         "masks", "map", "time_ms",
     ]  # fmt: skip
-    assert list(dotmask["ekf"]) == ["position_rmse_m", "position_rmse_ideal_m", "velocity_rmse_m_s", "nees", "nis"]
-    assert list(dotmask["tracking"]) == ["mota", "idf1", "hota", "switches"]
-    assert list(dotmask["moc"]) == ["precision", "recall", "flag_latency_frames", "unflag_latency_frames"]
-    assert list(dotmask["masks"]) == ["iou", "leak", "waste"]
+    assert list(dotmask["ekf"]) == [
+        "position_rmse_m", "position_bias_m", "position_bias_ray_m", "position_rmse_ideal_m", "position_bias_ideal_m",
+        "velocity_rmse_m_s", "velocity_bias_m_s", "nees", "nees_bounds", "nees_ideal", "nis", "nis_bounds",
+        "innovation_correlation", "innovation_correlation_bound",
+    ]  # fmt: skip
+    assert list(dotmask["tracking"]) == ["mota", "idf1", "hota", "deta", "assa", "switches"]
+    assert list(dotmask["moc"]) == [
+        "precision", "recall", "idle_flag_rate", "auc", "flag_latency_frames", "unflag_latency_frames", "starts",
+        "missed_starts", "start_latency_frames", "start_latency_max_frames", "by_class",
+    ]  # fmt: skip
+    assert list(dotmask["masks"]) == ["iou", "boundary_f", "leak", "waste"]
     assert list(dotmask["map"]) == ["ghost_fraction", "accuracy_m", "completeness"]
     assert list(dotmask["loops"]) == ["count", "trans_error_m", "rot_error_rad"]
     assert list(dotmask["time_ms"]) == ["segment", "track", "classify", "mask", "odometry", "map"]
@@ -82,6 +111,9 @@ def test_report_json_there_and_back() -> None:
         ("moc.precision>=0.9", True),
         ("moc.recall>=0", False),  # not measured: never holds
         ("time_ms.odometry<1e3", True),
+        ("moc.start_latency_max_frames<=3", True),
+        ("moc.auc>0.9", False),
+        ("tracking.hota>0.9", True),
     ],
 )
 def test_expectations(text: str, holds: bool) -> None:
@@ -97,6 +129,9 @@ def test_expectations(text: str, holds: bool) -> None:
         ("ate_rmse_m.x<1", "has no parts"),
         ("dotmask<1", "name a figure"),
         ("ate_rmse_m<1e", "is no number"),
+        ("moc.by_class<1", "'by_class' is not one number"),
+        ("moc.by_class.person<1", "'by_class' is not one number"),
+        ("ekf.nees_bounds<1", "'nees_bounds' is not one number"),
     ],
 )
 def test_bad_expectations_say_what_is_valid(text: str, message: str) -> None:
