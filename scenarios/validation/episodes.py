@@ -130,12 +130,8 @@ def record(
     return Episode(seed=seed, looks=tuple(looks), states=states)
 
 
-def _as_observed(observation: Observation) -> Observation:
-    return observation
-
-
 def follow(
-    episode: Episode, profile: Profile, adjust: Callable[[Observation], Observation] = _as_observed
+    episode: Episode, profile: Profile, adjust: Callable[[Observation], Observation]
 ) -> tuple[BeliefSample, ...]:
     """The beliefs of the filter from the second frame on: observe, initiate, then predict and update in every frame.
 
