@@ -10,7 +10,7 @@ from dotmask.evaluation.classification import roc
 from dotmask.pipeline import FrameResult
 from dotmask.profiles import CALIBRATED
 from scenarios.camera import camera_model
-from scenarios.spec import CameraSpec, PeopleSpec, PersonSpec, Scenario, StandAct, ThingSpec, WalkAct
+from scenarios.spec import PeopleSpec, PersonSpec, Scenario, StandAct, ThingSpec, WalkAct
 from scenarios.validation.plots import lines, receiver_curves
 from scenarios.validation.runs import THREADS, Contender, all_profiles, play
 from scenarios.validation.section import Context, Section, markdown_table, number
@@ -24,22 +24,21 @@ from sim.simulator import Simulator
 
 CHAIR_SPEEDS_M_S = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0)
 PERSON_SPEEDS_M_S = (0.6, 1.0, 1.5)
-CAMERA_SPEEDS_M_S = (0.0, 0.25, 0.5, 1.0, 2.0)
+CAMERA_SPEEDS_M_S = (0.0, 0.5, 1.0, 2.0)
 CAMERA_TEST_SPEED_M_S = 0.5
 """Speed of the chair while the camera's is varied."""
 STANDS_S, MOVES_S, WAY_M, RESTS_S = 1.0, 2.0, 1.9, 2.0
 """The chair stands, moves for so long but not farther than so far, and rests."""
 SWAY_M = 0.4
 """The camera goes from side to side, so far from the middle."""
-EYE_M, TARGET_M = (0.0, -2.5, 1.3), (0.0, 0.15, 0.55)
+EYE_M, TARGET_M = (0.0, -2.9, 2.3), (0.0, 0.15, 0.4)
+"""High enough to look over the low shelf: nothing hides the object."""
 
 RATE_HZ = 30.0
-SMALL = CameraSpec(width=320, height=240, fx=267.7, fy=269.6, cx=159.8, cy=123.55, position_m=EYE_M, tilt_deg=16.0)
 
 CHAIR = Scenario(
     name="slid_chair",
     description="A chair slides through the office at a constant speed.",
-    camera=SMALL,
     things=(ThingSpec(name="chair", kind="chair", look="red", position_m=(-0.9, 0.15, 0.0)),),
 )
 
@@ -158,7 +157,6 @@ def walker(speed_m_s: float, camera_speed_m_s: float) -> Simulator:
     scenario = Scenario(
         name="walker",
         description="A person walks through the office.",
-        camera=SMALL,
         people=PeopleSpec(cast=(person,)),
     )
     scene, camera = build_scene(scenario), camera_model(scenario.camera)
@@ -238,7 +236,7 @@ def write(context: Context) -> str:
     return "\n\n".join(
         [
             f"A chair stands for {STANDS_S:g} s, slides at a constant speed for {MOVES_S:g} s (not farther than "
-            f"{WAY_M:g} m), and stands again; a person stands, walks and stands. 320x240, sensor `kinect_v1`, "
+            f"{WAY_M:g} m), and stands again; a person stands, walks and stands. Sensor `kinect_v1`, "
             "closed loop with odometry, the camera goes from side to side at up to 0.2 m/s. Latencies in frames "
             "at 30 Hz, from the first frame above half of the nominal speed, and from the first frame after the "
             "motion; - means that the answer never came.",
