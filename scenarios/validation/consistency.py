@@ -233,10 +233,13 @@ def write(context: Context) -> str:
     for scene in dict.fromkeys(case.scene for case in CASES):
         found |= consistency(scene, [case for case in CASES if case.scene == scene], episodes, context.advance)
     intervals = chi_square_mean_bounds(6, episodes), chi_square_mean_bounds(3, episodes)
-    plot = context.save(
-        averages_over_time({name: (f.nees, f.nis) for name, f in found.items()}, intervals),
-        "consistency",
-        "NEES and NIS over time",
+    exact, other = (
+        {case.name: (found[case.name].nees, found[case.name].nis) for case in CASES if case.is_exact is is_exact}
+        for is_exact in (True, False)
+    )
+    plot = context.save(averages_over_time(exact, intervals), "consistency", "NEES and NIS over time, exact cases")
+    other_plot = context.save(
+        averages_over_time(other, intervals, is_log=True), "consistency_other", "NEES and NIS over time, other cases"
     )
     method = METHOD.format(
         episodes=episodes,
@@ -246,7 +249,7 @@ def write(context: Context) -> str:
         nis=bounds(chi_square_mean_bounds(3, episodes * (FRAMES - 1))),
     )
     table = markdown_table(HEADER, [_row(case, found[case.name]) for case in CASES])
-    return "\n\n".join([method, table, plot, EXCEPTIONS])
+    return "\n\n".join([method, table, plot, EXCEPTIONS, other_plot])
 
 
 HEADER = (

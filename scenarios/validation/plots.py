@@ -14,22 +14,28 @@ _BAND = {"color": "0.85", "zorder": 0}
 def averages_over_time(
     curves: Mapping[str, tuple[FloatArray, FloatArray]],
     bounds: tuple[tuple[float, float], tuple[float, float]],
+    *,
+    is_log: bool = False,
 ) -> Figure:
     """Average NEES and NIS at each frame, with the interval that a consistent filter's stay in.
 
     Args:
         curves: by name (T,) average NEES and (T,) average NIS.
         bounds: of both.
+        is_log: whether the values span decades.
     """
-    figure = Figure(figsize=(9, 3.6), layout="constrained")
+    figure = Figure(figsize=(9, 4.2), layout="constrained")
     axes = figure.subplots(1, 2)
     for axis, title, interval, k in zip(axes, ("NEES (6)", "NIS (3)"), bounds, (0, 1), strict=True):
         axis.axhspan(*interval, **_BAND)
         for name, values in curves.items():
             axis.plot(np.arange(1, len(values[k]) + 1), values[k], label=name, linewidth=1.2)
         _label(axis, "frame", f"average {title}")
-        axis.set_yscale("log")
-    axes[0].legend(fontsize=7)
+        if is_log:
+            axis.set_yscale("log")
+        else:
+            axis.set_ylim(0, sum(interval))
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=7)
     return figure
 
 

@@ -42,7 +42,7 @@ def write(context: Context) -> str:
             f"`{SCENARIO}`, the first {context.runs.frames} frames, profile `calibrated`. `previous` is the "
             "paper's loop: the tracker works with the pose of the frame before, so that all that stands seems to "
             "move by what the camera moved.",
-            markdown_table(header, rows),
+            markdown_table(header, rows, texts=2),
         ]
     )
 

@@ -21,4 +21,4 @@ def scenario_table(reports: Mapping[str, Mapping[str, MethodReport]], columns: S
         for scenario, by_profile in reports.items()
         for profile, report in by_profile.items()
     ]
-    return markdown_table(header, rows)
+    return markdown_table(header, rows, texts=2)
