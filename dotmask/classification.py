@@ -40,13 +40,15 @@ def classify(track: Track, previous: Track | None, profile: Profile) -> Verdict:
         )
     model = profile.class_model(track.class_name)
     surface, iou = track.surface, None
+    was_moving = before is not None and before.is_moving and before.reason is not Reason.NEW
+    moving_share = model.still_moving_share if was_moving else model.moving_share
     is_fast = speed > model.speed_threshold_m_s
     reason = Reason.IDLE
     if surface is not None and model.is_non_rigid:
         # A hand may move before the body does, without a change of the mask.
-        is_fast = surface.moving_share >= model.moving_share
+        is_fast = surface.moving_share >= moving_share
         reason = Reason.SURFACE if is_fast else Reason.IDLE
-    elif surface is not None and surface.moving_share < model.moving_share:
+    elif surface is not None and surface.moving_share < moving_share:
         is_fast = False
     elif is_fast and _is_significant(track, profile.speed_confidence):
         reason = Reason.SPEED

@@ -67,6 +67,14 @@ def moved_mask(mask: MaskImage, p_before: FloatArray, p_now: FloatArray, intrins
     return moved
 
 
+def dilate(mask: MaskImage, radius_px: int) -> MaskImage:
+    """`mask` (H, W) grown by a disc of `radius_px` pixels."""
+    grown = np.zeros_like(mask)
+    region, patch = dilated_patch(mask, radius_px)
+    grown[region] = patch
+    return grown
+
+
 def dilated_patch(mask: MaskImage, radius_px: int) -> tuple[tuple[slice, slice], MaskImage]:
     """The rectangle that a mask (H, W), grown by a disc of `radius_px`, lies in, and the grown mask inside it."""
     u, v, width, height = bounding_rectangle(mask)

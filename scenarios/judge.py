@@ -14,7 +14,7 @@ from dotmask.evaluation.masks import MaskCounts, count_masking, count_outlines, 
 from dotmask.evaluation.matching import mask_ious, match_detections
 from dotmask.evaluation.trajectory import absolute_trajectory_error, relative_pose_error
 from dotmask.pipeline import FrameResult
-from dotmask.records import FloatArray, Track, Trajectory
+from dotmask.records import Detections, FloatArray, Track, Trajectory
 from scenarios.oracle import CLASSES, MIN_PIXELS
 from scenarios.report import (
     ConfusionReport,
@@ -100,7 +100,7 @@ class Judge:
             self._masks += count_outlines(detections.masks, truth.instance_ids, matches)
         if "track" not in result.stage_seconds:
             return
-        self._classified += _classified(truth, result, matches)
+        self._classified += _classified(truth, result, detections, matches)
         self._identities.append(_identities(truth, tracks, ious))
         actors = {actor.instance_id: actor for actor in truth.objects}
         for track in tracks:
@@ -223,7 +223,7 @@ class Judge:
 
 
 def _classified(
-    truth: GroundTruth, result: FrameResult, matches: Sequence[int | None]
+    truth: GroundTruth, result: FrameResult, detections: Detections, matches: Sequence[int | None]
 ) -> Iterator[ClassificationRecord]:
     """The answer about every true object that a detection was matched to."""
     actors = {actor.instance_id: actor for actor in truth.objects}
@@ -233,14 +233,18 @@ def _classified(
             continue
         track = by_detection.get(index)
         verdict = None if track is None else track.verdict
+        if verdict is None:
+            # No belief to ask: what became of its pixels is the answer.
+            is_flagged = not result.front_end.masked.mo_mdi_m[detections.masks[index]].any()
+        else:
+            is_flagged = verdict.is_moving
         yield ClassificationRecord(
             frame=result.frame.index,
             instance_id=instance,
             class_name=actors[instance].class_name,
             is_moving=actors[instance].is_moving,
             true_speed_m_s=float(np.linalg.norm(actors[instance].velocity_world)),
-            # What has no track is masked by the pipeline, hence answered as moving.
-            is_flagged=verdict is None or verdict.is_moving,
+            is_flagged=is_flagged,
             speed_m_s=None if verdict is None else verdict.speed_m_s,
         )
 

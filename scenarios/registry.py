@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from scenarios.catalog import (
+    faults,
     fr2,
     fr3_household,
     fr3_sitting,
@@ -11,16 +12,31 @@ from scenarios.catalog import (
     gatherings,
     hard_views,
     movers,
+    original_failures,
     robot,
     smoke,
 )
 from scenarios.errors import unknown
 from scenarios.spec import Scenario
 
+MODULES = (
+    smoke,
+    fr3_walking,
+    fr3_sitting,
+    fr2,
+    fr3_household,
+    robot,
+    gatherings,
+    hard_views,
+    movers,
+    faults,
+    original_failures,
+)
+
 
 def _collect() -> dict[str, Scenario]:
     named: dict[str, Scenario] = {}
-    for module in (smoke, fr3_walking, fr3_sitting, fr2, fr3_household, robot, gatherings, hard_views, movers):
+    for module in MODULES:
         for scenario in module.SCENARIOS:
             if scenario.name in named:
                 raise ValueError(f"two scenarios are called {scenario.name}")
@@ -30,6 +46,15 @@ def _collect() -> dict[str, Scenario]:
 
 SCENARIOS: Mapping[str, Scenario] = MappingProxyType(_collect())
 """All scenarios by name."""
+
+
+def _first_with_its_frames(scenario: Scenario) -> str:
+    return next(name for name, other in SCENARIOS.items() if scenario.has_frames_of(other))
+
+
+RENDERED_AS: Mapping[str, str] = MappingProxyType({n: _first_with_its_frames(s) for n, s in SCENARIOS.items()})
+"""For every scenario the first one with the same frames: itself, but for scenarios that differ in their faults alone.
+What looks at frames (checks, contact sheets, tests of the rendering) looks once for all that share them."""
 
 
 def scenario(name: str) -> Scenario:

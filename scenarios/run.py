@@ -14,14 +14,16 @@ from typing import cast, get_args
 import cv2
 
 from dotmask.interfaces import Segmenter
+from dotmask.original import OriginalDotMask
 from dotmask.pipeline import ClosedLoop, DotMask, FrontEnd, MaskAll, Unmasked
-from dotmask.profiles import PoseFeedback, Profile
+from dotmask.profiles import ORIGINAL, PoseFeedback, Profile
 from dotmask.profiles import profile as get_profile
 from dotmask.records import FloatArray, RgbdFrame
 from dotmask.slam.embedded import EmbeddedSlam
 from dotmask.tum import format_trajectory
 from scenarios.bridge import rgbd_frame_from_sim
 from scenarios.errors import ScenarioError, unknown
+from scenarios.faults.chain import Faults
 from scenarios.judge import Judge
 from scenarios.oracle import OracleSegmenter
 from scenarios.report import Report, WorldTimes
@@ -32,10 +34,16 @@ from scenarios.world import RENDERERS, build_simulator
 from sim.records import SimFrame
 from sim.simulator import Simulator
 
+
+def _method(segmenter: Segmenter, chosen: Profile) -> FrontEnd:
+    """The method; the profile `original` is another program."""
+    return OriginalDotMask(segmenter) if chosen is ORIGINAL else DotMask(segmenter, chosen)
+
+
 METHODS: dict[str, Callable[[Segmenter, Profile], FrontEnd]] = {
     "unmasked": lambda segmenter, chosen: Unmasked(),
     "mdi": MaskAll,
-    "dotmask": DotMask,
+    "dotmask": _method,
 }
 """What may be compared: raw depth to both, all objects of interest removed from both, the method."""
 
@@ -103,9 +111,9 @@ class RunSettings:
         )
 
 
-def default_out(scenario: Scenario) -> Path:
-    """`runs/NAME-SEED`, or the first free `runs/NAME-SEED-2` and so on."""
-    base = Path("runs") / f"{scenario.name}-{scenario.seed}"
+def default_out(scenario: Scenario, prefix: str = "") -> Path:
+    """`runs/PREFIXNAME-SEED`, or the first free `runs/PREFIXNAME-SEED-2` and so on."""
+    base = Path("runs") / f"{prefix}{scenario.name}-{scenario.seed}"
     number, path = 1, base
     while path.exists():
         number += 1
@@ -158,7 +166,7 @@ def run(scenario: Scenario, settings: RunSettings, out: Path, advance: Callable[
     with RunFolder(out) as folder, one_opencv_thread(), ThreadPoolExecutor(len(settings.methods)) as pool:
         folder.write("scenario.json", scenario.to_json())
         simulator = build_simulator(scenario, settings.renderer, settings.threads)
-        oracle = OracleSegmenter()
+        oracle = OracleSegmenter(Faults(scenario))
         loops: dict[str, ClosedLoop] = {}
         judges = {name: Judge(name) for name in settings.methods}
         digest, render_seconds = hashlib.sha256(), 0.0
@@ -174,7 +182,11 @@ def run(scenario: Scenario, settings: RunSettings, out: Path, advance: Callable[
             if not loops:
                 # The first true pose fixes the world of the estimates, as the alignment of a trajectory would.
                 start = sim_frame.truth.T_world_camera
-                loops = {name: _closed_loop(name, settings, oracle, frame, start) for name in settings.methods}
+                chosen = get_profile(settings.profile)
+                loops = {
+                    name: closed_loop(METHODS[name](oracle, chosen), settings, frame, start)
+                    for name in settings.methods
+                }
             # Each method has its own state, so the order in which they are done cannot matter.
             steps = pool.map(lambda loop, now=frame: loop.step(now), loops.values())
             results = dict(zip(loops, steps, strict=True))
@@ -207,12 +219,16 @@ def run(scenario: Scenario, settings: RunSettings, out: Path, advance: Callable[
     return report
 
 
-def _closed_loop(
-    name: str, settings: RunSettings, segmenter: Segmenter, first: RgbdFrame, T_world_camera: FloatArray
-) -> ClosedLoop:
-    front_end = METHODS[name](segmenter, get_profile(settings.profile))
-    slam = EmbeddedSlam(first.intrinsics, T_world_camera)
-    return ClosedLoop(front_end, slam, settings.pose_feedback, T_world_camera)
+def closed_loop(front_end: FrontEnd, settings: RunSettings, first: RgbdFrame, T_world_camera: FloatArray) -> ClosedLoop:
+    """The front end in a loop with the SLAM of the settings.
+
+    Args:
+        front_end: what masks the depth.
+        settings: how the scenario is run.
+        first: the first frame.
+        T_world_camera: (4, 4) its true pose, which fixes the world of the estimates.
+    """
+    return ClosedLoop(front_end, EmbeddedSlam(first.intrinsics, T_world_camera), settings.pose_feedback, T_world_camera)
 
 
 @contextmanager

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from scenarios.registry import SCENARIOS, scenario
+from scenarios.registry import RENDERED_AS, SCENARIOS, scenario
 from scenarios.spec import Scenario
 from scenarios.world import build_simulator
 from tools.doc_block import write_block
@@ -47,10 +47,12 @@ def _write(image: npt.NDArray[np.uint8], text: str, place_px: tuple[int, int]) -
 
 
 def listing() -> str:
-    """Markdown: every scenario with its sheet."""
+    """Markdown: every scenario with its sheet, or with the name of the one whose frames it shares."""
     parts = []
     for name, chosen in SCENARIOS.items():
-        parts.append(f"### `{name}`\n\n{chosen.description}\n\n![{name}](contact_sheets/{name}.jpg)")
+        first = RENDERED_AS[name]
+        frames = f"![{name}](contact_sheets/{name}.jpg)" if first == name else f"The frames are those of `{first}`."
+        parts.append(f"### `{name}`\n\n{chosen.description}\n\n{frames}")
     return "\n\n".join(parts)
 
 
@@ -61,7 +63,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=DOCS / "contact_sheets", help="folder of the sheets")
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
-    for name in arguments.names or SCENARIOS:
+    for name in arguments.names or dict.fromkeys(RENDERED_AS.values()):
         image = cv2.cvtColor(sheet(scenario(name)), cv2.COLOR_RGB2BGR)
         path = arguments.out / f"{name}.jpg"
         if not cv2.imwrite(str(path), image, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY]):

@@ -7,14 +7,21 @@ from dotmask.records import Detections
 def select_detections(detections: Detections, profile: Profile) -> Detections:
     """The objects of interest with a score of at least the threshold, at most m of them, best first.
 
-    Equal scores are ordered by their boxes, so the answer does not depend on the order in which a segmenter lists its
-    detections. Source: paper, Experimental Setup (p and m).
+    Source: paper, Experimental Setup (p and m).
     """
     names = {model.name for model in profile.classes}
+    wanted = [i for i, name in enumerate(detections.class_names) if name in names]
+    return select_best(detections if len(wanted) == len(detections) else detections.select(wanted), profile)
+
+
+def select_best(detections: Detections, profile: Profile) -> Detections:
+    """The detections of any class with a score of at least the threshold, at most m of them, best first.
+
+    Equal scores are ordered by their boxes, so the answer does not depend on the order in which a segmenter lists its
+    detections.
+    """
     scores = detections.scores
-    wanted = [
-        i for i, name in enumerate(detections.class_names) if name in names and scores[i] >= profile.score_threshold
-    ]
+    wanted = [i for i in range(len(detections)) if scores[i] >= profile.score_threshold]
     best = sorted(wanted, key=lambda i: (-scores[i], *detections.boxes_px[i], detections.class_names[i]))
     best = best[: profile.max_observations]
     return detections if best == list(range(len(detections))) else detections.select(best)

@@ -23,10 +23,15 @@ _SCALE = 2
 """Points are followed in the image at half its size."""
 _WINDOW_PX, _LEVELS = 11, 3
 _FLOW_STOP = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 10, 0.03)
+_MOST_DIFFERENCE = 8.0
+"""Mean difference in grey levels between the surroundings of a point then and now; more, and it was not found again."""
 _BORDER = np.ones((5, 5), np.uint8)
 """Points keep off a mask's border by two pixels of the half size image: there, the background moves with them."""
-_CORNER_QUALITY, _CORNER_DISTANCE_PX = 0.02, 4
-_REFILL_BELOW = 0.6
+_CORNER_QUALITY, _CORNER_DISTANCE_PX = 0.01, 4
+_SPREAD = 0.6
+"""Corners keep this share of the distance that they would have if they were spread evenly: they are found on the arms
+as well as on the print of a shirt."""
+_REFILL_BELOW = 0.85
 """New corners are looked for when fewer than this share of the wanted points is left."""
 _DEPTH_JUMP_M = 0.3
 """A point whose depth changes by more from one frame to the next has slipped off its object."""
@@ -141,11 +146,13 @@ def surface_motions(
     elapsed_s = points.timestamp_s - points.past_s
 
     seen_px = _SCALE * points.pixels[known] + 0.5 * (_SCALE - 1)
-    expected_px = project(transform(inverse(T_world_camera), past[rows, age - 1]), intrinsics)
-    left_px = np.linalg.norm(seen_px - expected_px, axis=1)
-    speeds = left_px * p_camera[:, 2] / intrinsics.fx / elapsed_s[age - 1]
     thresholds = np.array([model.speed_threshold_m_s for model in models])[owner]
-    is_moving = ~(left_px <= settings.flow_sigmas * settings.flow_sigma_px) & (speeds > thresholds)
+    is_moving = np.zeros(len(known), np.bool_)
+    for ago in (age - 1, (age - 1) // 2):
+        expected_px = project(transform(inverse(T_world_camera), past[rows, ago]), intrinsics)
+        left_px = np.linalg.norm(seen_px - expected_px, axis=1)
+        speeds = left_px * p_camera[:, 2] / intrinsics.fx / elapsed_s[ago]
+        is_moving |= ~(left_px <= settings.flow_sigmas * settings.flow_sigma_px) & (speeds > thresholds)
 
     lag = np.minimum(age, max(1, int(np.count_nonzero(elapsed_s <= settings.velocity_s)))) - 1
     T = T_world_camera
@@ -187,7 +194,7 @@ def _half_size(rgb: ColourImage) -> GreyImage:
 
 def _flow(before: SurfacePoints, grey: GreyImage) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.bool_]]:
     """Where the points are in `grey` (N, 2), and whether each was found (N,)."""
-    pixels, found, _ = cv2.calcOpticalFlowPyrLK(
+    pixels, found, difference = cv2.calcOpticalFlowPyrLK(
         before.grey,
         grey,
         before.pixels,
@@ -196,7 +203,8 @@ def _flow(before: SurfacePoints, grey: GreyImage) -> tuple[npt.NDArray[np.float3
         maxLevel=_LEVELS,
         criteria=_FLOW_STOP,
     )
-    return np.asarray(pixels, np.float32), np.asarray(found)[:, 0] == 1
+    is_alike = np.asarray(difference)[:, 0] <= _MOST_DIFFERENCE
+    return np.asarray(pixels, np.float32), (np.asarray(found)[:, 0] == 1) & is_alike
 
 
 def _inner_region(box_px: FloatArray, mask: npt.NDArray[np.bool_]) -> _Region:
@@ -229,13 +237,15 @@ def _corners(grey: GreyImage, region: _Region, have: npt.NDArray[np.float32], wa
     height, width = region.inside.shape
     if len(have) >= _REFILL_BELOW * wanted or not region.inside.any():
         return np.zeros((0, 2), np.float32)
+    area = cv2.countNonZero(region.inside)
+    distance_px = max(_CORNER_DISTANCE_PX, int(_SPREAD * np.sqrt(area / wanted)))
     free = region.inside
     if len(have):
         free = region.inside.copy()
         for u, v in np.rint(have).astype(int) - (region.left, region.top):
-            cv2.circle(free, (int(u), int(v)), _CORNER_DISTANCE_PX, 0, -1)
+            cv2.circle(free, (int(u), int(v)), distance_px, 0, -1)
     patch = np.ascontiguousarray(grey[region.top : region.top + height, region.left : region.left + width])
-    found = cv2.goodFeaturesToTrack(patch, wanted - len(have), _CORNER_QUALITY, _CORNER_DISTANCE_PX, mask=free)
+    found = cv2.goodFeaturesToTrack(patch, wanted - len(have), _CORNER_QUALITY, distance_px, mask=free)
     if found is None:
         return np.zeros((0, 2), np.float32)
     return np.asarray(found[:, 0] + np.array([region.left, region.top], np.float32), np.float32)

@@ -1,6 +1,7 @@
 """Two people at a desk, after the sequences fr3/sitting_* of the TUM RGB-D benchmark.
 
-One sits and gestures, one stands and talks: objects of interest that hardly move and carry many useful features.
+One sits and speaks by turns, with gestures, one stands and listens: objects of interest that stay where they are and
+carry many useful features.
 """
 
 from scenarios.spec import CameraSpec, PeopleSpec, PersonSpec, Scenario, SitAct, StandAct, ThingSpec
@@ -12,7 +13,7 @@ PEOPLE = PeopleSpec(
             character="man",
             outfit="plaid",
             seated_on="chair_left",
-            acts=(SitAct(duration_s=3600.0, amplitude=0.5),),
+            acts=(SitAct(duration_s=3600.0),),
         ),
         PersonSpec(
             name="berta",

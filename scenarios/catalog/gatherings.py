@@ -26,6 +26,24 @@ def _stander(name: str, looks: tuple[str, str], position_m: tuple[float, float],
     )
 
 
+CROWD = Scenario(
+    name="crowd",
+    description="Four people walk and two stand; often less than half of the view is static.",
+    tags=("walking", "occlusion", "stress"),
+    frames=600,
+    camera=CameraSpec(position_m=(0.0, -2.65, 1.45), amplitude=0.5),
+    people=PeopleSpec(
+        cast=(
+            _walker("anton", ("man", "plaid"), NEAR_LOOP, 0.4, 1.0),
+            _walker("berta", ("woman", "stripes"), NEAR_LOOP, 3.1, 1.0),
+            _walker("carl", ("tall_man", "oxford"), FAR_LOOP, 0.3, 0.9),
+            _walker("dora", ("short_woman", "gingham"), FAR_LOOP, 2.9, 0.9),
+            _stander("emil", ("tall_man", "sweater"), (-1.8, 0.5), -40.0),
+            _stander("fanny", ("short_woman", "dots"), (1.8, 0.45), 215.0),
+        )
+    ),
+)
+
 SCENARIOS = (
     Scenario(
         name="plaid_idle",
@@ -48,21 +66,5 @@ SCENARIOS = (
             )
         ),
     ),
-    Scenario(
-        name="crowd",
-        description="Four people walk and two stand; often less than half of the view is static.",
-        tags=("walking", "occlusion", "stress"),
-        frames=600,
-        camera=CameraSpec(position_m=(0.0, -2.65, 1.45), amplitude=0.5),
-        people=PeopleSpec(
-            cast=(
-                _walker("anton", ("man", "plaid"), NEAR_LOOP, 0.4, 1.0),
-                _walker("berta", ("woman", "stripes"), NEAR_LOOP, 3.1, 1.0),
-                _walker("carl", ("tall_man", "oxford"), FAR_LOOP, 0.3, 0.9),
-                _walker("dora", ("short_woman", "gingham"), FAR_LOOP, 2.9, 0.9),
-                _stander("emil", ("tall_man", "sweater"), (-1.8, 0.5), -40.0),
-                _stander("fanny", ("short_woman", "dots"), (1.8, 0.45), 215.0),
-            )
-        ),
-    ),
+    CROWD,
 )

@@ -1,4 +1,4 @@
-"""A named sequence: everything that decides its bytes."""
+"""A named sequence: everything that decides its bytes, and what the segmenter gets wrong in them."""
 
 import json
 from typing import Annotated, Any, Literal, Self
@@ -8,13 +8,14 @@ from pydantic import Field, ValidationError, model_validator
 from scenarios.errors import ScenarioError
 from scenarios.spec.base import Positive, Spec
 from scenarios.spec.camera import Camera, CameraSpec
+from scenarios.spec.faults import FaultsSpec
 from scenarios.spec.people import PeopleSpec, PushAct, SitDownAct
 from scenarios.spec.sensor import SensorSpec
 from scenarios.spec.things import ThingSpec
 
 
 class Scenario(Spec):
-    """A named sequence: everything that decides its bytes.
+    """A named sequence: everything that decides its bytes, and what the segmenter gets wrong in them.
 
     Attributes:
         name, description, tags: for people.
@@ -24,6 +25,7 @@ class Scenario(Spec):
         variant: the counterfactuals, with the same camera and seed: "moving" is the scenario itself; in "frozen" people
             and things stay as they are at time 0; in "empty" there are no people, and things stay.
         camera, people, things, sensor: see their types.
+        faults: what the segmenter gets wrong; no pixel depends on it.
     """
 
     name: str
@@ -38,6 +40,7 @@ class Scenario(Spec):
     people: PeopleSpec = PeopleSpec()
     things: tuple[ThingSpec, ...] = ()
     sensor: SensorSpec = SensorSpec()
+    faults: FaultsSpec = FaultsSpec()
 
     @model_validator(mode="after")
     def _names(self) -> Self:
@@ -61,6 +64,15 @@ class Scenario(Spec):
     def duration_s(self) -> float:
         """Time from the first to the last frame."""
         return (self.frames - 1) / self.frame_rate_hz
+
+    def without_faults(self) -> "Scenario":
+        """The same frames, and a segmenter that makes no mistakes."""
+        return self.model_copy(update={"faults": FaultsSpec()})
+
+    def has_frames_of(self, other: "Scenario") -> bool:
+        """Whether all frames are the same, because everything is but the texts and the faults."""
+        texts = {"name": "", "description": "", "tags": ()}
+        return self.without_faults().model_copy(update=texts) == other.without_faults().model_copy(update=texts)
 
     def to_json(self) -> str:
         """The complete scenario; `scenario_from_json` reads it back equal."""

@@ -237,9 +237,14 @@ def write(context: Context) -> str:
         {case.name: (found[case.name].nees, found[case.name].nis) for case in CASES if case.is_exact is is_exact}
         for is_exact in (True, False)
     )
-    plot = context.save(averages_over_time(exact, intervals), "consistency", "NEES and NIS over time, exact cases")
-    other_plot = context.save(
-        averages_over_time(other, intervals, is_log=True), "consistency_other", "NEES and NIS over time, other cases"
+    plot = context.plot(
+        "consistency", "NEES and NIS, exact cases", lambda f: averages_over_time(f, exact, intervals), (9, 4.2)
+    )
+    other_plot = context.plot(
+        "consistency_other",
+        "NEES and NIS, other cases",
+        lambda f: averages_over_time(f, other, intervals, is_log=True),
+        (9, 4.2),
     )
     method = METHOD.format(
         episodes=episodes,

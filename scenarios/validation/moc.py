@@ -10,14 +10,12 @@ def write(context: Context) -> str:
     """See Section."""
     reports = reports_of(context, [name for name in SCENARIOS if name.startswith("fr3_")])
     profiles = list(next(iter(reports.values())))
-    plot = context.save(
-        bars(
-            list(reports),
-            {p: [by_profile[p].moc.idle_flag_rate for by_profile in reports.values()] for p in profiles},
-            "share of resting objects flagged",
-        ),
+    rates = {p: [by_profile[p].moc.idle_flag_rate for by_profile in reports.values()] for p in profiles}
+    plot = context.plot(
         "moc_idle",
         "Idle flag rate by scenario",
+        lambda figure: bars(figure, list(reports), rates, "share of resting objects flagged"),
+        (9, 4),
     )
     return "\n\n".join(
         [

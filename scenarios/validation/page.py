@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from scenarios.errors import ScenarioError, unknown
-from scenarios.validation import consistency, faults, masks, moc, pose_feedback, speeds, tracking, walking
+from scenarios.validation import attribution, consistency, faults, masks, moc, pose_feedback, speeds, tracking, walking
 from scenarios.validation.runs import Runs
 from scenarios.validation.section import Context, Section
 
@@ -16,6 +16,7 @@ SECTIONS: tuple[Section, ...] = (
     pose_feedback.SECTION,
     tracking.SECTION,
     masks.SECTION,
+    attribution.SECTION,
     faults.SECTION,
 )
 

@@ -1,4 +1,4 @@
-"""Plots of the validation page, drawn without a display."""
+"""Plots of the validation page: each function draws on an empty figure."""
 
 from collections.abc import Mapping, Sequence
 
@@ -12,19 +12,20 @@ _BAND = {"color": "0.85", "zorder": 0}
 
 
 def averages_over_time(
+    figure: Figure,
     curves: Mapping[str, tuple[FloatArray, FloatArray]],
     bounds: tuple[tuple[float, float], tuple[float, float]],
     *,
     is_log: bool = False,
-) -> Figure:
+) -> None:
     """Average NEES and NIS at each frame, with the interval that a consistent filter's stay in.
 
     Args:
+        figure: to draw on.
         curves: by name (T,) average NEES and (T,) average NIS.
         bounds: of both.
         is_log: whether the values span decades.
     """
-    figure = Figure(figsize=(9, 4.2), layout="constrained")
     axes = figure.subplots(1, 2)
     for axis, title, interval, k in zip(axes, ("NEES (6)", "NIS (3)"), bounds, (0, 1), strict=True):
         axis.axhspan(*interval, **_BAND)
@@ -36,19 +37,18 @@ def averages_over_time(
         else:
             axis.set_ylim(0, sum(interval))
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=7)
-    return figure
 
 
 def lines(
+    figure: Figure,
     x: Sequence[float],
     curves: Mapping[str, Sequence[float | None]],
     x_label: str,
     y_label: str,
     *,
     is_log_x: bool = False,
-) -> Figure:
+) -> None:
     """Curves over a common axis; None leaves a gap."""
-    figure = Figure(figsize=(5.6, 3.6), layout="constrained")
     axis = figure.subplots()
     for name, values in curves.items():
         axis.plot(x, [np.nan if v is None else v for v in values], "o-", label=name, markersize=4, linewidth=1.2)
@@ -57,19 +57,18 @@ def lines(
     axis.set_ylim(bottom=0)
     _label(axis, x_label, y_label)
     axis.legend(fontsize=8)
-    return figure
 
 
 def receiver_curves(
-    curves: Mapping[str, tuple[FloatArray, FloatArray]], points: Mapping[str, tuple[float, float]]
-) -> Figure:
+    figure: Figure, curves: Mapping[str, tuple[FloatArray, FloatArray]], points: Mapping[str, tuple[float, float]]
+) -> None:
     """ROC curves.
 
     Args:
+        figure: to draw on.
         curves: by name the false and the true positive rate (T,) at each threshold.
         points: by name of a curve where the profile's own threshold lies.
     """
-    figure = Figure(figsize=(5, 4), layout="constrained")
     axis = figure.subplots()
     for name, (false_rate, true_rate) in curves.items():
         (line,) = axis.plot(false_rate, true_rate, "-", label=name, linewidth=1.2)
@@ -79,12 +78,10 @@ def receiver_curves(
     axis.set_xlim(-0.02, 1.02)
     axis.set_ylim(-0.02, 1.02)
     axis.legend(fontsize=8, loc="lower right")
-    return figure
 
 
-def bars(groups: Sequence[str], series: Mapping[str, Sequence[float | None]], y_label: str) -> Figure:
+def bars(figure: Figure, groups: Sequence[str], series: Mapping[str, Sequence[float | None]], y_label: str) -> None:
     """Bars side by side: a group for each scenario, a colour for each profile."""
-    figure = Figure(figsize=(max(5.0, 0.9 * len(groups) + 2.0), 3.6), layout="constrained")
     axis = figure.subplots()
     width = 0.8 / len(series)
     for k, (name, values) in enumerate(series.items()):
@@ -94,7 +91,6 @@ def bars(groups: Sequence[str], series: Mapping[str, Sequence[float | None]], y_
     axis.set_ylabel(y_label)
     axis.grid(axis="y", alpha=0.3)
     axis.legend(fontsize=8)
-    return figure
 
 
 def _label(axis: Axes, x_label: str, y_label: str) -> None:

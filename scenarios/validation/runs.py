@@ -1,19 +1,23 @@
 """Runs of several contenders on the same rendered frames, each in closed loop with odometry of its own."""
 
+import os
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from dotmask.pipeline import ClosedLoop, DotMask, FrameResult
+from dotmask.pipeline import ClosedLoop, FrameResult
 from dotmask.profiles import PROFILES, PoseFeedback, Profile
 from dotmask.slam.embedded import EmbeddedSlam
 from scenarios.bridge import rgbd_frame_from_sim
+from scenarios.faults.chain import Faults
 from scenarios.judge import Judge
 from scenarios.oracle import OracleSegmenter
+from scenarios.registry import RENDERED_AS
 from scenarios.registry import scenario as scenario_by_name
 from scenarios.report import MethodReport
-from scenarios.run import one_opencv_thread, rendered_ahead
+from scenarios.run import METHODS, one_opencv_thread, rendered_ahead
 from scenarios.run_folder import RunFolder
 from scenarios.spec import Scenario, with_overrides
 from scenarios.world import build_simulator
@@ -30,15 +34,17 @@ class Contender:
     Attributes:
         profile: parameters.
         pose_feedback: camera pose for the tracker.
+        scenario: whose faults its segmenter has; None: none.
     """
 
     profile: Profile
     pose_feedback: PoseFeedback
+    scenario: Scenario | None = None
 
 
-def all_profiles() -> dict[str, Contender]:
-    """Every profile, with its own pose feedback; the best last."""
-    return {p.name: Contender(profile=p, pose_feedback=p.pose_feedback) for p in PROFILES}
+def all_profiles(scenario: Scenario | None = None) -> dict[str, Contender]:
+    """Every profile, with its own pose feedback, by name; the segmenter has the faults of `scenario`."""
+    return {p.name: Contender(profile=p, pose_feedback=p.pose_feedback, scenario=scenario) for p in PROFILES}
 
 
 def play(
@@ -51,31 +57,37 @@ def play(
         contenders: by name.
         advance: called after every frame.
     """
-    oracle = OracleSegmenter()
+    oracles = {
+        name: OracleSegmenter() if c.scenario is None else OracleSegmenter(Faults(c.scenario))
+        for name, c in contenders.items()
+    }
     loops: dict[str, ClosedLoop] = {}
-    with one_opencv_thread():
+    with one_opencv_thread(), ThreadPoolExecutor(os.cpu_count()) as pool:
         for timed in rendered_ahead(simulator):
             frame, truth = rgbd_frame_from_sim(timed.frame), timed.frame.truth
-            oracle.show(frame.index, truth)
+            for oracle in oracles.values():
+                oracle.show(frame.index, truth)
             if not loops:
                 start = truth.T_world_camera
                 loops = {
                     name: ClosedLoop(
-                        DotMask(oracle, contender.profile),
+                        METHODS["dotmask"](oracles[name], contender.profile),
                         EmbeddedSlam(frame.intrinsics, start),
                         contender.pose_feedback,
                         start,
                     )
                     for name, contender in contenders.items()
                 }
-            yield timed.frame, {name: loop.step(frame) for name, loop in loops.items()}
+            # Each contender has its own state, so the order in which they are done cannot matter.
+            steps = pool.map(lambda loop, now=frame: loop.step(now), loops.values())
+            yield timed.frame, dict(zip(loops, steps, strict=True))
             advance()
 
 
 def judged(
     scenario: Scenario, contenders: Mapping[str, Contender], advance: Callable[[], None]
 ) -> dict[str, MethodReport]:
-    """The report on each contender."""
+    """The report on each contender, on the frames of `scenario`."""
     judges = {name: Judge(name) for name in contenders}
     simulator = build_simulator(scenario, "numba", THREADS)
     with tempfile.TemporaryDirectory() as parent, RunFolder(Path(parent) / "run") as folder:
@@ -98,11 +110,20 @@ class Runs:
         self._advance = advance
         self._reports: dict[str, dict[str, MethodReport]] = {}
 
-    def reports(self, name: str) -> dict[str, MethodReport]:
-        """The report on each profile."""
-        if name not in self._reports:
-            self._reports[name] = judged(self.shortened(scenario_by_name(name)), all_profiles(), self._advance)
-        return self._reports[name]
+    def reports(self, names: Sequence[str]) -> dict[str, dict[str, MethodReport]]:
+        """By scenario the report on each profile. Scenarios that differ in their faults alone are rendered once."""
+        missing = [name for name in names if name not in self._reports]
+        for rendered in dict.fromkeys(RENDERED_AS[name] for name in missing):
+            scenarios = [self.shortened(scenario_by_name(name)) for name in missing if RENDERED_AS[name] == rendered]
+            contenders = {
+                f"{scenario.name}/{profile}": contender
+                for scenario in scenarios
+                for profile, contender in all_profiles(scenario).items()
+            }
+            found = judged(scenarios[0], contenders, self._advance)
+            for scenario in scenarios:
+                self._reports[scenario.name] = {p.name: found[f"{scenario.name}/{p.name}"] for p in PROFILES}
+        return {name: self._reports[name] for name in names}
 
     def shortened(self, scenario: Scenario) -> Scenario:
         """`scenario` with no more frames than are wanted."""

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from scenarios.plots import figure_file
 from scenarios.validation.runs import Runs
 
 
@@ -25,9 +26,19 @@ class Context:
     runs: Runs
     advance: Callable[[], None]
 
-    def save(self, figure: Figure, name: str, alternative: str) -> str:
-        """Write a plot and return the Markdown that shows it."""
-        figure.savefig(self.folder / f"{name}.png", dpi=110, metadata={"Software": None})
+    def plot(
+        self, name: str, alternative: str, draw: Callable[[Figure], None], size_in: tuple[float, float] = (5.6, 3.8)
+    ) -> str:
+        """Write a plot and return the Markdown that shows it.
+
+        Args:
+            name: of the file.
+            alternative: what to read where no picture is shown.
+            draw: on an empty figure.
+            size_in: width and height, inches.
+        """
+        with figure_file(self.folder / f"{name}.png", *size_in) as figure:
+            draw(figure)
         return f"![{alternative}]({self.folder.name}/{name}.png)"
 
 

@@ -209,29 +209,19 @@ def write(context: Context) -> str:
         v: answers(slid_chair(CAMERA_TEST_SPEED_M_S, v), {"paper": contenders["paper"], **feedbacks}, context.advance)
         for v in cameras
     }
-    latencies = context.save(
-        lines(
-            speeds,
-            {name: [chairs[v][name].flag_latency_frames(v) for v in speeds] for name in contenders},
-            "speed of the chair, m/s",
-            "frames until flagged",
-            is_log_x=True,
-        ),
+    flags = {name: [chairs[v][name].flag_latency_frames(v) for v in speeds] for name in contenders}
+    latencies = context.plot(
         "latency_speed",
         "Latency by speed of the object",
+        lambda f: lines(f, speeds, flags, "speed of the chair, m/s", "frames until flagged", is_log_x=True),
     )
-    idle = context.save(
-        lines(
-            cameras,
-            {
-                name: [fast[v][name].idle_flag_share(CAMERA_TEST_SPEED_M_S) for v in cameras]
-                for name in fast[cameras[0]]
-            },
-            "peak speed of the camera, m/s",
-            "share of frames flagged at rest",
-        ),
+    shares = {
+        name: [fast[v][name].idle_flag_share(CAMERA_TEST_SPEED_M_S) for v in cameras] for name in fast[cameras[0]]
+    }
+    idle = context.plot(
         "idle_camera_speed",
         "Idle chairs flagged by speed of the camera",
+        lambda f: lines(f, cameras, shares, "peak speed of the camera, m/s", "share of frames flagged at rest"),
     )
     return "\n\n".join(
         [
@@ -310,7 +300,7 @@ def _roc(context: Context, runs: Mapping[float, Mapping[str, Answers]], names: S
         curves[name] = curve.false_positive_rate, curve.true_positive_rate
         points[name] = float(flags[~truth].mean()), float(flags[truth].mean())
         rows.append([name, number(curve.auc, 3), number(points[name][0], 3), number(points[name][1], 3)])
-    plot = context.save(receiver_curves(curves, points), "roc", "ROC of the speed threshold")
+    plot = context.plot("roc", "ROC of the speed threshold", lambda f: receiver_curves(f, curves, points), (5, 4))
     return "\n\n".join(
         [
             "ROC of the speed threshold, over all frames of all chairs above: the line is what a threshold on the "

@@ -10,7 +10,7 @@ Column = tuple[str, Callable[[MethodReport], str]]
 
 def reports_of(context: Context, names: Sequence[str]) -> dict[str, dict[str, MethodReport]]:
     """By scenario and profile; of a quick page the first scenario alone."""
-    return {name: context.runs.reports(name) for name in (names[:1] if context.is_quick else names)}
+    return context.runs.reports(names[:1] if context.is_quick else names)
 
 
 def scenario_table(reports: Mapping[str, Mapping[str, MethodReport]], columns: Sequence[Column]) -> str:

@@ -15,6 +15,8 @@ from sim.people.handling import ChairContact
 from sim.people.idle import Idle
 from sim.people.rows import SIZE, posture_from_row, root_from_row
 
+SEAT_HOLDS = 0.75
+"""By this share the small movements of a person who sits are smaller than of one who stands."""
 FIDGET_SHARE = 2.5
 """The small movements of a stander are gone at a gait of size 1 / FIDGET_SHARE."""
 
@@ -165,10 +167,11 @@ class PersonMotion:
         gestures = self.gesturing.at(time_s)
         if gestures > 0.0:
             posture = self.idle.gesturing(posture, time_s, gestures)
-        amount = stillness * self.liveliness.at(time_s)
+        sitting = self.sitting.at(time_s)
+        amount = stillness * self.liveliness.at(time_s) * (1.0 - SEAT_HOLDS * sitting)
         if amount > 0.0:
             apart = abs(float(posture.ankles[0, 1] - posture.ankles[1, 1])) / FEET_APART_M
-            sway = max(1.0 - apart, 0.0) * (1.0 - self.sitting.at(time_s))
+            sway = max(1.0 - apart, 0.0) * (1.0 - sitting)
             posture = self.idle.swayed(posture, time_s, amount, sway=sway)
         pushing = self.pushing.at(time_s)
         if pushing > 0.0:

@@ -7,7 +7,19 @@ from pathlib import Path
 
 import pytest
 
-HEAVY = ("torch", "pybullet", "pyrender", "numba", "gtsam", "cv2", "scipy", "trimesh", "gymnasium", "numpy")
+HEAVY = (
+    "torch",
+    "pybullet",
+    "pyrender",
+    "numba",
+    "gtsam",
+    "cv2",
+    "scipy",
+    "trimesh",
+    "gymnasium",
+    "numpy",
+    "matplotlib",
+)
 
 
 def test_packages_lie_under_one_root() -> None:
@@ -23,7 +35,7 @@ def test_a_foreign_sim_is_named(tmp_path: Path) -> None:
     assert "another package named 'sim' hides ours" in done.stderr
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"]])
+@pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"], ["attribute", "--help"]])
 def test_help_loads_nothing_heavy(arguments: list[str]) -> None:
     code = (
         "import sys\nfrom scenarios import cli\n"

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import pytest
 
-from scenarios.registry import SCENARIOS
+from scenarios.registry import RENDERED_AS, SCENARIOS
 from scenarios.world import RENDERERS, build_simulator
 from sim.renderers.pyrender_renderer.gl_context import RendererMissingError, choose_platform
 
@@ -34,7 +34,8 @@ QUICK = ("smoke", "crowd", "tilted")
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in SCENARIOS]
+    "name",
+    [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in sorted(set(RENDERED_AS.values()))],
 )
 def test_depth_ids_and_colour_agree_in_every_scenario(name: str) -> None:
     simulator = build_simulator(SCENARIOS[name], "numba", 1)

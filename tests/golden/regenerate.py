@@ -13,7 +13,7 @@ import numpy as np
 
 from dotmask.evaluation.trajectory import absolute_trajectory_error, relative_pose_error
 from dotmask.records import Trajectory
-from scenarios.registry import SCENARIOS, scenario
+from scenarios.registry import RENDERED_AS, scenario
 from scenarios.spec import with_overrides
 from scenarios.world import build_simulator
 
@@ -43,8 +43,9 @@ def frame_hash(name: str) -> str:
 
 
 def frame_hashes() -> dict[str, str]:
-    """Of all scenarios, by name."""
-    return {name: frame_hash(name) for name in sorted(SCENARIOS)}
+    """Of all scenarios, by name; those that share their frames share the hash."""
+    rendered = {name: frame_hash(name) for name in set(RENDERED_AS.values())}
+    return {name: rendered[RENDERED_AS[name]] for name in sorted(RENDERED_AS)}
 
 
 def trajectory_figures() -> dict[str, float]:

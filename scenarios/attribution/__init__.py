@@ -1,0 +1,1 @@
+"""Which stage of the method is to blame: stages replaced by the truth, one at a time and all but one."""
