@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from scenarios.errors import ScenarioError
-from scenarios.validation import page
+from scenarios.validation import page, runs
 from scenarios.validation.section import Section, bounds, markdown_table, number
 from scenarios.validation.speeds import Answers, Slid
 from sim.geometry import pose
@@ -57,6 +57,24 @@ def test_tables_show_what_was_not_measured_as_a_dash() -> None:
     assert markdown_table(["a", "b"], [["x", number(None)]]) == "| a | b |\n| --- | ---: |\n| x | - |"
     assert number(0.1234, 1, 100) == "12.3"
     assert bounds((1.0, 2.0)) == "1.00 to 2.00"
+
+
+def test_scenarios_that_differ_in_their_faults_alone_are_rendered_once(monkeypatch) -> None:
+    asked = []
+
+    def judged(scenario, contenders, advance):
+        asked.append((scenario.name, scenario.frames, contenders))
+        return {name: f"report on {name}" for name in contenders}
+
+    monkeypatch.setattr(runs, "judged", judged)
+    made = runs.Runs(25, lambda: None)
+    reports = made.reports(("fault_missed", "smoke", "fault_missed_bursts"))
+    assert list(reports) == ["fault_missed", "smoke", "fault_missed_bursts"]
+    assert [(name, frames) for name, frames, _ in asked] == [("fault_missed", 25), ("smoke", 25)]
+    assert reports["fault_missed_bursts"]["paper"] == "report on fault_missed_bursts/paper"
+    assert asked[0][2]["fault_missed_bursts/paper"].scenario.name == "fault_missed_bursts"
+    assert made.reports(("smoke",))["smoke"] is reports["smoke"]
+    assert len(asked) == 2
 
 
 def test_latencies_count_from_the_first_and_from_after_the_last_moving_frame() -> None:
