@@ -432,6 +432,36 @@ def bench(
 
 
 @app.command()
+def validate(
+    out: Annotated[Path, typer.Option(help="Folder for plots; the page is written beside it.", show_default=False)],
+    only: Annotated[
+        list[str] | None, typer.Option(metavar="SECTION", help="Make this section alone. May be repeated.")
+    ] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Few frames and seeds: only to see that it runs.")] = False,
+) -> None:
+    """Measure every stage against the truth and write OUT.md: consistency, errors, latencies, identities, masks.
+
+    With --only, the other sections stay as they are in the folder.
+
+    Examples:  dotmask validate --out docs/validation
+
+    dotmask validate --quick --out runs/validation --only consistency
+    """
+    from scenarios.validation.page import validate as write_page
+
+    with _progress() as progress:
+        task = progress.add_task("validate", total=None)
+        page = write_page(
+            out,
+            is_quick=quick,
+            only=only or [],
+            show=lambda title: progress.update(task, description=title),
+            advance=lambda: progress.advance(task),
+        )
+    typer.echo(str(page))
+
+
+@app.command()
 def doctor() -> None:
     """Check that everything this program needs is here and unharmed.
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from dotmask.evaluation.filter import BeliefSample
 from dotmask.profiles import ClassModel, Profile
 from dotmask.records import Detections, FloatArray, Observation, RgbdFrame
 from dotmask.tracking.ekf import initiate, update
@@ -45,28 +46,14 @@ class Episode:
     """One object seen by a moving camera.
 
     Attributes:
+        seed: that it was drawn from.
         looks: the frames.
         states: (T, 6) true position (of the ideal observation) and velocity, world.
     """
 
+    seed: int
     looks: tuple[Look, ...]
     states: FloatArray
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Trace:
-    """What the filter made of an episode, from the second frame on.
-
-    Attributes:
-        errors: (T - 1, 6) estimate less truth.
-        covariances: (T - 1, 6, 6) P.
-        whitened: (T - 1, 3) innovations times the inverse of the Cholesky root of S: independent and of unit variance
-            if the filter is consistent.
-    """
-
-    errors: FloatArray
-    covariances: FloatArray
-    whitened: FloatArray
 
 
 def random_states(model: ClassModel, start_world: FloatArray, frames: int, seed: int) -> FloatArray:
@@ -140,37 +127,42 @@ def record(
         told[:3, 3] += T_world_camera[:3, :3] @ shift
         told[:3, :3] @= Rotation.from_rotvec(turn).as_matrix()
         looks.append(Look(frame=frame, detections=detections, T_world_camera=told))
-    return Episode(looks=tuple(looks), states=states)
+    return Episode(seed=seed, looks=tuple(looks), states=states)
 
 
-def _as_observed(observation: Observation) -> Observation:
-    return observation
-
-
-def follow(episode: Episode, profile: Profile, adjust: Callable[[Observation], Observation] = _as_observed) -> Trace:
-    """Run the filter over an episode: observe, initiate, and then predict and update in every frame.
+def follow(
+    episode: Episode, profile: Profile, adjust: Callable[[Observation], Observation]
+) -> tuple[BeliefSample, ...]:
+    """The beliefs of the filter from the second frame on: observe, initiate, then predict and update in every frame.
 
     Args:
         episode: the frames.
         profile: parameters.
         adjust: changes each observation before the filter sees it, to try other R.
     """
-    track = None
-    errors, covariances, whitened = [], [], []
+    track, samples = None, []
     for look, truth in zip(episode.looks, episode.states, strict=True):
         [observation] = observe(look.detections, look.frame, profile)
-        observation = adjust(observation)
+        observation, time_s = adjust(observation), look.frame.timestamp_s
         if track is None:
-            track = initiate(observation, look.frame.timestamp_s, look.T_world_camera, profile, 1)
+            track = initiate(observation, time_s, look.T_world_camera, profile, 1)
             continue
-        predicted = predict(track, look.frame.timestamp_s, profile)
-        track = update(predicted, observation, None, look.T_world_camera, profile)
-        assert track.innovation is not None
-        root = np.linalg.cholesky(track.innovation.covariance)
-        whitened.append(np.linalg.solve(root, track.innovation.residual))
-        errors.append(track.mean - truth)
-        covariances.append(track.covariance)
-    return Trace(errors=np.array(errors), covariances=np.array(covariances), whitened=np.array(whitened))
+        track = update(predict(track, time_s, profile), observation, None, look.T_world_camera, profile)
+        samples.append(
+            BeliefSample(
+                frame=look.frame.index,
+                track_id=episode.seed,
+                instance_id=episode.seed,
+                mean=track.mean,
+                covariance=track.covariance,
+                innovation=track.innovation,
+                centre_world=truth[:3],
+                velocity_world=truth[3:],
+                ideal_world=truth[:3],
+                T_world_camera=look.T_world_camera,
+            )
+        )
+    return tuple(samples)
 
 
 def rigid(profile: Profile, pose_sigmas: tuple[float, float] = (0.0, 0.0)) -> Profile:
