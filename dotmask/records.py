@@ -275,7 +275,7 @@ class Track:
         mask: (H, W) bool, the last mask seen.
         mask_timestamp_s: when it was seen.
         mask_position_camera: (3,) where the track was then in the camera frame, metres.
-        partial_timestamp_s: when something last hid a part of it, or when it was first seen.
+        is_partial: whether something hid a part of it when it was last seen.
         innovation: of this frame's update; None at birth and when not seen.
         surface: how its surface moved; None when not seen, or with too few points.
         verdict: moving or idle; None until the classification has run.
@@ -293,7 +293,7 @@ class Track:
     mask: MaskImage
     mask_timestamp_s: float
     mask_position_camera: FloatArray
-    partial_timestamp_s: float
+    is_partial: bool
     innovation: Innovation | None = None
     surface: SurfaceMotion | None = None
     verdict: Verdict | None = None
@@ -304,11 +304,6 @@ class Track:
             object.__setattr__(self, name, checked(getattr(self, name), name, shape, np.float64))
             check_finite(getattr(self, name), name)
         object.__setattr__(self, "mask", checked(self.mask, "mask", (None, None), np.bool_))
-
-    @property
-    def is_partial(self) -> bool:
-        """Whether something hid a part of it when it was last seen."""
-        return self.partial_timestamp_s == self.mask_timestamp_s
 
     @property
     def position_world(self) -> FloatArray:

@@ -55,7 +55,7 @@ def initiate(
         mask=observation.mask,
         mask_timestamp_s=timestamp_s,
         mask_position_camera=observation.position_camera,
-        partial_timestamp_s=timestamp_s,
+        is_partial=observation.is_partial,
     )
 
 
@@ -108,7 +108,7 @@ def update(
         mask=observation.mask,
         mask_timestamp_s=track.timestamp_s,
         mask_position_camera=transform(T_camera_world, mean[:3]),
-        partial_timestamp_s=track.timestamp_s if observation.is_partial else track.partial_timestamp_s,
+        is_partial=observation.is_partial,
         innovation=innovation,
         surface=surface,
     )

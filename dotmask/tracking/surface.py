@@ -126,7 +126,8 @@ def surface_motions(
     """How the surface of each detection moves in the world; None where too few points are known from before.
 
     A point counts as moving if it left the pixel that it would be seen at, had it stood still since it was first
-    followed, by more than the flow's noise, and faster than the class's threshold.
+    followed (or for half of that time), by more than the flow's noise, and faster than the class's threshold. What
+    comes straight at the camera hardly does: its velocity tells.
 
     Args:
         points: of this frame.

@@ -37,7 +37,8 @@ def track_objects(
 
     Tracks without an observation keep their prediction and go on moving; after `profile.max_misses` such frames they
     end, tentative ones at once. Tracks and observations that the gate left over are paired again as if the object had
-    come out from behind something. Observations without a track start one, in the order of the observations.
+    come out from behind something. Observations without a track start one, in the order of the
+    observations.
 
     Args:
         state: after the frame before.
