@@ -43,24 +43,27 @@ def classify(track: Track, previous: Track | None, profile: Profile) -> Verdict:
     was_moving = before is not None and before.is_moving and before.reason is not Reason.NEW
     moving_share = model.still_moving_share if was_moving else model.moving_share
     is_fast = speed > model.speed_threshold_m_s
-    reason = Reason.IDLE
+    reason, speaks_for_rest = Reason.IDLE, True
     if surface is not None and model.is_non_rigid:
         # A hand may move before the body does, without a change of the mask.
-        is_fast = surface.moving_share >= moving_share
-        reason = Reason.SURFACE if is_fast else Reason.IDLE
+        reason = Reason.SURFACE if surface.moving_share >= moving_share else Reason.IDLE
     elif surface is not None and surface.moving_share < moving_share:
-        is_fast = False
+        reason = Reason.IDLE
+    elif surface is None and track.is_partial and profile.surface is not None:
+        # The centre of the visible part slides over the object: its speed says nothing.
+        speaks_for_rest = False
     elif is_fast and _is_significant(track, profile.speed_confidence):
         reason = Reason.SPEED
-    elif model.is_non_rigid and previous is not None and previous.misses == 0:
-        iou = (aligned_iou if profile.aligns_masks else intersection_over_union)(previous.mask, track.mask)
-        reason = Reason.DEFORMATION if iou < profile.deformation_iou else Reason.IDLE
+    else:
+        # A speed above the threshold that may still be noise speaks neither for motion nor for rest.
+        speaks_for_rest = not is_fast
+        if model.is_non_rigid and previous is not None and previous.misses == 0:
+            iou = (aligned_iou if profile.aligns_masks else intersection_over_union)(previous.mask, track.mask)
+            reason = Reason.DEFORMATION if iou < profile.deformation_iou else Reason.IDLE
     if reason is not Reason.IDLE:
         return Verdict(is_moving=True, reason=reason, speed_m_s=speed, mask_iou=iou, calm_frames=0)
 
-    # A speed above the threshold that may still be noise speaks neither for motion nor for rest.
-    calm = before.calm_frames if before is not None else 0
-    calm = calm if is_fast else calm + 1
+    calm = (before.calm_frames if before is not None else 0) + speaks_for_rest
     if calm >= profile.calm_frames or (before is not None and before.reason is Reason.IDLE):
         return Verdict(is_moving=False, reason=Reason.IDLE, speed_m_s=speed, mask_iou=iou, calm_frames=calm)
     if before is None or before.reason is Reason.NEW:

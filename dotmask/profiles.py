@@ -117,7 +117,7 @@ class SurfaceSettings:
 
     points: int = 40
     least_points: int = 5
-    memory_frames: int = 10
+    memory_frames: int = 6
     velocity_s: float = 0.11
     flow_sigma_px: float = 0.5
     flow_sigmas: float = 3.0

@@ -22,8 +22,16 @@ HAND_HELD_PATHS = MappingProxyType({"static": StaticPath, "xyz": XyzPath, "rpy":
 
 
 def camera_model(spec: IntrinsicsSpec) -> CameraModel:
-    """The intrinsics."""
-    return CameraModel(width=spec.width, height=spec.height, fx=spec.fx, fy=spec.fy, cx=spec.cx, cy=spec.cy)
+    """The intrinsics and the exposure."""
+    return CameraModel(
+        width=spec.width,
+        height=spec.height,
+        fx=spec.fx,
+        fy=spec.fy,
+        cx=spec.cx,
+        cy=spec.cy,
+        exposure_ev=spec.exposure_ev,
+    )
 
 
 def camera_path(scenario: Scenario) -> CameraPath:

@@ -11,7 +11,14 @@ from sim.geometry import FloatArray
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraModel:
-    """Pinhole camera: `u = fx x / z + cx`, `v = fy y / z + cy`; the centre of pixel (0, 0) is u = v = 0."""
+    """Pinhole camera: `u = fx x / z + cx`, `v = fy y / z + cy`; the centre of pixel (0, 0) is u = v = 0.
+
+    Attributes:
+        width: pixels.
+        height: pixels.
+        fx, fy, cx, cy: pixels.
+        exposure_ev: in stops: one more makes the image twice as bright, up to the soft limit near white.
+    """
 
     width: int
     height: int
@@ -19,6 +26,7 @@ class CameraModel:
     fy: float
     cx: float
     cy: float
+    exposure_ev: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -69,7 +69,7 @@ def observe(detections: Detections, frame: RgbdFrame, profile: Profile) -> tuple
         class_model = profile.class_model(class_name)
         is_partial = False
         if labels is not None:
-            view = _View(index + 1, labels, frame.depth_m, profile.noise.occluder_margin_m + 0.02 * depth**2)
+            view = _View(index + 1, labels, frame.depth_m, depth, profile.noise.occluder_margin_m + 0.02 * depth**2)
             is_partial = _is_partial(view, crop, frame.intrinsics)
         observations.append(
             Observation(
@@ -145,6 +145,7 @@ class _View(NamedTuple):
         label: of the detection.
         labels: (H, W) uint8, 0 where no detection is.
         depth_m: (H, W).
+        distance_m: of the object.
         margin_m: how much nearer than the object something unlabelled must be to count as an occluder and not as the
             floor before its feet.
     """
@@ -152,6 +153,7 @@ class _View(NamedTuple):
     label: int
     labels: npt.NDArray[np.uint8]
     depth_m: DepthImage
+    distance_m: float
     margin_m: float
 
 
@@ -172,6 +174,8 @@ def _is_partial(view: _View, crop: _Crop, intrinsics: Intrinsics) -> bool:
     if u0 <= 1 or v0 <= 1 or u1 >= intrinsics.width - 1 or v1 >= intrinsics.height - 1:
         return True
     rows, columns = slice(v0, v1, 1 + (v1 - v0) // _LINES), slice(u0, u1, 1 + (u1 - u0) // _LINES)
+    if _is_covered(view, (rows, columns)):
+        return True
     left, right = slice(max(u0 - _BAND_PX, 0), u0 + _RIM_PX), slice(u1 - _RIM_PX, u1 + _BAND_PX)
     top, bottom = slice(max(v0 - _BAND_PX, 0), v0 + _RIM_PX), slice(v1 - _RIM_PX, v1 + _BAND_PX)
     return (
@@ -180,6 +184,13 @@ def _is_partial(view: _View, crop: _Crop, intrinsics: Intrinsics) -> bool:
         or _ends_behind_occluder(view, (top, columns), across_columns=False, is_high=False)
         or _ends_behind_occluder(view, (bottom, columns), across_columns=False, is_high=True)
     )
+
+
+def _is_covered(view: _View, box: tuple[slice, slice]) -> bool:
+    """Whether another detection, nearer than the object, takes more of the box than the object itself."""
+    labels, depth_m = view.labels[box], view.depth_m[box]
+    is_other = (labels != 0) & (labels != view.label) & (depth_m > 0) & (depth_m < view.distance_m)
+    return bool(np.count_nonzero(is_other) > np.count_nonzero(labels == view.label))
 
 
 def _ends_behind_occluder(view: _View, strip: tuple[slice, slice], *, across_columns: bool, is_high: bool) -> bool:

@@ -13,6 +13,7 @@ class IntrinsicsSpec(Spec):
     Attributes:
         width, height: pixels.
         fx, fy, cx, cy: intrinsics in pixels at that size; the defaults are the fr3 camera of the TUM benchmark.
+        exposure_ev: in stops: one more makes the image twice as bright, up to the soft limit near white.
     """
 
     width: Annotated[int, Field(ge=32, le=4096)] = 640
@@ -21,6 +22,7 @@ class IntrinsicsSpec(Spec):
     fy: Positive = 539.2
     cx: float = 320.1
     cy: float = 247.6
+    exposure_ev: Annotated[float, Field(ge=-4, le=4)] = 0.0
 
 
 class CameraSpec(IntrinsicsSpec):

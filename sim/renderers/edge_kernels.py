@@ -100,13 +100,20 @@ def inverse_depth_plane(camera, faces, t):
 
 
 @njit(**KERNEL)
-def differ(rgb, first, second):
-    """Whether two pixels (offsets into the flat colours) differ enough to see a step between them."""
-    for c in range(3):
-        difference = np.int64(rgb[first + np.uint64(c)]) - np.int64(rgb[second + np.uint64(c)])
-        if difference > CONTRAST or difference < -CONTRAST:
-            return True
-    return False
+def find_steps(triangles, colours, first, second, found):
+    """Set `found` where the pixels from `first` and those from `second` on (flat) show two triangles and two colours.
+
+    Colours are 0x00bbggrr. The loop has no branch, so that it becomes vector instructions.
+    """
+    for x in range(len(found)):
+        n, m = first + np.uint64(x), second + np.uint64(x)
+        a, b = colours[n], colours[m]
+        red = np.int32(a & 255) - np.int32(b & 255)
+        green = np.int32((a >> 8) & 255) - np.int32((b >> 8) & 255)
+        blue = np.int32((a >> 16) & 255) - np.int32((b >> 16) & 255)
+        found[x] = (triangles[n] != triangles[m]) & (
+            (abs(red) > CONTRAST) | (abs(green) > CONTRAST) | (abs(blue) > CONTRAST)
+        )
 
 
 @njit(**KERNEL)
@@ -136,14 +143,32 @@ def shares(camera, faces, neighbours, fx, fy, s, t, ray_x, ray_y, far_x, far_y):
 
 
 @njit(**KERNEL)
-def blend_edges(camera, faces, neighbours, fx, fy, cx, cy, triangles, inverse_depth, rgb, row_first, row_last, smooth):
-    """Copy the rows row_first..row_last-1 of `rgb` to `smooth`, edges blended. Reads one more row on each side."""
+def blend_edges(
+    camera,
+    faces,
+    neighbours,
+    fx,
+    fy,
+    cx,
+    cy,
+    triangles,
+    inverse_depth,
+    colour,
+    row_first,
+    row_last,
+    rgb,
+):
+    """Fill the rows row_first..row_last-1 of `rgb` (H, W, 3) from `colour` (H, W), 0x00bbggrr, with edges blended.
+
+    Reads one more row on each side.
+    """
     height, width = triangles.shape
     half, zero = f32(0.5), f32(0)
-    flat_t, flat_w, flat_c, target = triangles.ravel(), inverse_depth.ravel(), rgb.ravel(), smooth.ravel()
+    flat_t, flat_w, flat_c, target = triangles.ravel(), inverse_depth.ravel(), colour.ravel(), rgb.ravel()
     # Shares of a row's pixels: from the left, the right, above, below; and those from above of the next row.
     left, right = np.zeros(width, np.float32), np.zeros(width, np.float32)
     above, below, following = np.zeros(width, np.float32), np.zeros(width, np.float32), np.zeros(width, np.float32)
+    found = np.zeros(width, np.bool_)
     for y in range(max(row_first - 1, 0), row_last):
         below[:], following[:], left[:], right[:] = zero, zero, zero, zero
         for direction in range(2):  # to the right, downwards
@@ -151,11 +176,14 @@ def blend_edges(camera, faces, neighbours, fx, fy, cx, cy, triangles, inverse_de
                 continue
             step = np.uint64(1 if direction == 0 else width)
             ray_y, next_y = (y - cy) / fy, (y + direction - cy) / fy
+            row = np.uint64(y * width)
+            steps = found[: width - 1 + direction]
+            find_steps(flat_t, flat_c, row, row + step, steps)
             for x in range(width - 1 + direction):
-                n = np.uint64(y * width + x)
-                s, t = flat_t[n], flat_t[n + step]
-                if s == t or not differ(flat_c, np.uint64(3) * n, np.uint64(3) * (n + step)):
+                if not steps[x]:
                     continue
+                n = row + np.uint64(x)
+                s, t = flat_t[n], flat_t[n + step]
                 if s >= 0 and (neighbours[s, 0] == t or neighbours[s, 1] == t or neighbours[s, 2] == t):
                     continue
                 ray_x, next_x = (x - cx) / fx, (x + 1 - direction - cx) / fx
@@ -168,21 +196,22 @@ def blend_edges(camera, faces, neighbours, fx, fy, cx, cy, triangles, inverse_de
                 else:
                     below[x], following[x] = a, b
         if y >= row_first:
-            smooth[y] = rgb[y]
+            for x in range(width):
+                own = colour[y, x]
+                rgb[y, x, 0], rgb[y, x, 1], rgb[y, x, 2] = own & 255, (own >> 8) & 255, own >> 16
             for x in range(width):
                 # A slanted edge is met in both directions, with the same area.
                 across, along = left[x] + right[x], above[x] + below[x]
                 if across + along == zero:
                     continue
-                step = 3 if across >= along else 3 * width
+                step = 1 if across >= along else width
                 before, after = (left[x], right[x]) if across >= along else (above[x], below[x])
-                first = 3 * (y * width + x)
-                for n in range(first, first + 3):
-                    own = f32(flat_c[n])
-                    value = own
+                n = y * width + x
+                for c in range(3):
+                    value = own = f32((flat_c[n] >> 8 * c) & 255)
                     if before > zero:
-                        value += before * (f32(flat_c[n - step]) - own)
+                        value += before * (f32((flat_c[n - step] >> 8 * c) & 255) - own)
                     if after > zero:
-                        value += after * (f32(flat_c[n + step]) - own)
-                    target[n] = np.uint8(value + half)
+                        value += after * (f32((flat_c[n + step] >> 8 * c) & 255) - own)
+                    target[3 * n + c] = np.uint8(value + half)
         above, following = following, above

@@ -89,19 +89,16 @@ def cross(ax, ay, az, bx, by, bz):
 
 
 @njit(**KERNEL)
-def clip_span(slope, inverse_slope, offset, first, last):
-    """The part of the pixels first..last-1 where slope * x + offset >= 0."""
-    if slope > 0:
-        crossing = -offset * inverse_slope
-        if crossing > first:
-            first = last if crossing >= last else int(np.ceil(crossing))
-    elif slope < 0:
-        crossing = -offset * inverse_slope
-        if crossing < last:
-            last = first if crossing <= first else int(np.ceil(crossing))
-    elif offset < 0:
-        last = first
-    return first, last
+def narrow(rises, inverse_slope, offset, low, high):
+    """The part of the span low <= x < high where slope * x + offset >= 0; `rises` is slope >= 0.
+
+    No branch: whether an edge cuts the span is as good as random. A slope of +0 has the inverse +inf, and leaves all or
+    nothing; the crossing that is then not a number (offset 0) compares false and leaves all.
+    """
+    crossing = -offset * inverse_slope
+    low = crossing if rises & (crossing > low) else low
+    high = crossing if (not rises) & (crossing < high) else high
+    return low, high
 
 
 @njit(**KERNEL)
@@ -207,19 +204,23 @@ def rasterise(
         wy = (e0y + e1y + e2y) * inverse_det
         wz = (e0z + e1z + e2z) * inverse_det
         # det < 0: the sign of the edge functions turns round
-        slope0, slope1, slope2 = -e0x * inverse_fx, -e1x * inverse_fx, -e2x * inverse_fx
+        slope0, slope1, slope2 = 0.0 - e0x * inverse_fx, 0.0 - e1x * inverse_fx, 0.0 - e2x * inverse_fx  # never -0
+        rises0, rises1, rises2 = slope0 >= 0.0, slope1 >= 0.0, slope2 >= 0.0
         inverse0, inverse1, inverse2 = 1.0 / slope0, 1.0 / slope1, 1.0 / slope2
         w_step = f32(wx * inverse_fx)
         face_number = np.int32(t)
 
         for y in range(y_first, y_last):
             v = (y - cy) * inverse_fy
-            first, last = clip_span(slope0, inverse0, -(e0y * v + e0z) - slope0 * cx, x_first, x_last)
-            first, last = clip_span(slope1, inverse1, -(e1y * v + e1z) - slope1 * cx, first, last)
-            first, last = clip_span(slope2, inverse2, -(e2y * v + e2z) - slope2 * cx, first, last)
+            low, high = narrow(rises0, inverse0, -(e0y * v + e0z) - slope0 * cx, float(x_first), float(x_last))
+            low, high = narrow(rises1, inverse1, -(e1y * v + e1z) - slope1 * cx, low, high)
+            low, high = narrow(rises2, inverse2, -(e2y * v + e2z) - slope2 * cx, low, high)
             if crosses_near:  # 1/near - 1/z >= 0
-                slope = -wx * inverse_fx
-                first, last = clip_span(slope, 1.0 / slope, 1.0 / near - wy * v - wz - slope * cx, first, last)
+                slope = 0.0 - wx * inverse_fx
+                low, high = narrow(slope >= 0.0, 1.0 / slope, 1.0 / near - wy * v - wz - slope * cx, low, high)
+            if not low < high:
+                continue
+            first, last = int(np.ceil(low)), int(np.ceil(high))
             if first >= last:
                 continue
             w_first = f32(wx * (first - cx) * inverse_fx + wy * v + wz)

@@ -13,15 +13,21 @@ import numpy as np
 from numba import njit
 
 from sim.renderers.kernels import KERNEL, cross
+from sim.renderers.texture_kernels import (
+    AREA,
+    BLOCK,
+    COLOUR,
+    GREEN,
+    INTEGER_ROWS,
+    ORIGIN,
+    RED_BLUE,
+    SIDE,
+    U,
+    V,
+    look_up,
+)
 
 f32 = np.float32
-
-BLOCK = 64
-"""Pixels shaded together. Its scratch rows have a constant distance, so LLVM can prove that they do not overlap and
-vectorise the lighting."""
-
-AREA_MAX = f32(2.0**40)
-"""Texels per pixel beyond every texture."""
 
 SHADOW_NEAR = f32(0.05)
 SHADOW_TANGENT = 2.75
@@ -32,35 +38,6 @@ SHADOW_OFFSET_TEXELS = f32(2.2)
 
 BRIGHTNESS_KNEE = f32(0.7)
 """Brightness above it is compressed and stays below 1: no channel burns out."""
-
-
-FIELDS = 0x0000FF0000FF00FF
-
-
-@njit(**KERNEL)
-def spread(texel):
-    """0x00bbggrr to FIELDS: red, blue and green, each with room for a product with 256."""
-    t = np.int64(texel)
-    return (t | (t << 32)) & FIELDS
-
-
-@njit(**KERNEL)
-def bilinear(texels, level, size, u, v):
-    """Mean of four texels of the mip level that begins at `level`, as three 16-bit fields (r, g, b from below).
-
-    u, v >= 0 are in 1/256 texel and repeat beyond `size`, a power of two.
-    """
-    wrap = size - 1
-    u0, v0 = (u >> 8) & wrap, (v >> 8) & wrap
-    u1, v1 = (u0 + 1) & wrap, (v0 + 1) & wrap
-    top, bottom = level + v0 * size, level + v1 * size
-    weight_u, weight_v = u & 255, v & 255
-    w11 = (weight_u * weight_v) >> 8
-    total = spread(texels[np.uint64(top + u0)]) * (256 - weight_u - weight_v + w11)
-    total += spread(texels[np.uint64(top + u1)]) * (weight_u - w11)
-    total += spread(texels[np.uint64(bottom + u0)]) * (weight_v - w11)
-    total += spread(texels[np.uint64(bottom + u1)]) * w11
-    return (total >> 8) & FIELDS
 
 
 @njit(**KERNEL)
@@ -91,19 +68,19 @@ def shade(
     lights,
     ambient,
     shadow_maps,
-    rgb,
+    colour,
     depth,
     ids,
 ):
     """Colour, z-depth and id of the rows row_first..row_last-1, from the visibility buffer.
 
     Per block of pixels: interpolate the attributes, add up the light, look up the texture. Light varies slowly, so two
-    neighbours on one triangle share a lane of the lighting.
+    neighbours on one triangle share a lane of the lighting. `colour` (H, W) is 0x00bbggrr.
     """
     one, half, zero = f32(1), f32(0.5), f32(0)
-    u1, u2, u3 = np.uint64(1), np.uint64(2), np.uint64(3)
+    u1, u3 = np.uint64(1), np.uint64(3)
     flat_t, flat_w = triangles.ravel(), inverse_depth.ravel()
-    flat_rgb, flat_depth, flat_ids = rgb.ravel(), depth.ravel(), ids.ravel()
+    flat_colour, flat_depth, flat_ids = colour.ravel(), depth.ravel(), ids.ravel()
     width = triangles.shape[1]
     inverse_fx, inverse_fy = 1.0 / fx, 1.0 / fy
     inverse_focals = inverse_fx * inverse_fy
@@ -115,14 +92,17 @@ def shade(
     shadow_centre = f32(shadow_size - 1) * half
     shadow_focal = f32(shadow_size * 0.5 / SHADOW_TANGENT)
     offset_per_metre = SHADOW_OFFSET_TEXELS / shadow_focal if shadow_size > 0 else zero
-    # Rows of the scratch, by pixel: 0-1 uv, 2 texels per pixel; by lane: 3-5 normal, 6 ray x, 7 z, 8-10 position,
+    # Rows of the real scratch, by pixel: those of `look_up`; by lane: 3-5 normal, 6 ray x, 7 z, 8-10 position,
     # 11 brightness, 12 one light's share, 13-14 shadow texel, 15 limit of 1/z in the shadow map.
     s = np.zeros(16 * BLOCK, np.float32)
-    bits = s.view(np.int32)
-    face_of, level_of = np.zeros(BLOCK, np.int32), np.zeros(BLOCK, np.int32)
-    size_of, origin_of = np.zeros(BLOCK, np.int32), np.zeros(BLOCK, np.int32)
-    lane_of = np.zeros(BLOCK, np.int64)
+    integer = np.zeros(INTEGER_ROWS * BLOCK, np.int32)
+    natural = integer.view(np.uint32)
+    lane_of, factors = np.zeros(BLOCK, np.int64), np.zeros(BLOCK, np.uint32)
+    rays_x = np.zeros(width, np.float32)
+    for x in range(width):
+        rays_x[x] = (x - cx) * inverse_fx
     for y in range(row_first, row_last):
+        row_start = np.uint64(y * width)
         ray_y = (y - cy) * inverse_fy
         ray_y32 = f32(ray_y)
         row_x = T[0, 1] * ray_y32 + T[0, 2]
@@ -131,16 +111,14 @@ def shade(
         for x_first in range(0, width, BLOCK):
             count = min(BLOCK, width - x_first)
             previous, lanes, is_open = -1, 0, False
+            integer[SIDE : SIDE + BLOCK] = 0
             i = j = k = np.uint32(0)
-            q1x = q1 = q2x = q2 = density = zero
+            q1x = q1 = q2x = q2 = density = u_a = u_b = u_g = v_a = v_b = v_g = zero
             side = origin = np.int32(0)
             for n in range(count):
-                x = x_first + n
-                pixel = np.uint64(y * width + x)
+                pixel = row_start + np.uint64(x_first + n)
                 t = flat_t[pixel]
-                face_of[n] = t
                 if t < 0:
-                    flat_rgb[u3 * pixel] = flat_rgb[u3 * pixel + u1] = flat_rgb[u3 * pixel + u2] = 0
                     flat_depth[pixel] = 0
                     flat_ids[pixel] = 0
                     continue
@@ -161,21 +139,20 @@ def shade(
                     texture = np.uint32(face_texture[face])
                     side, origin = texture_size[texture], texture_offset[texture]
                     size = np.float64(side)
-                    du1, dv1 = attributes[j, 6] - attributes[i, 6], attributes[j, 7] - attributes[i, 7]
-                    du2, dv2 = attributes[k, 6] - attributes[i, 6], attributes[k, 7] - attributes[i, 7]
-                    uv_area = abs(du1 * dv2 - dv1 * du2)
+                    u_a, u_b, u_g = attributes[i, 6], attributes[j, 6], attributes[k, 6]
+                    v_a, v_b, v_g = attributes[i, 7], attributes[j, 7], attributes[k, 7]
+                    uv_area = abs((u_b - u_a) * (v_g - v_a) - (v_b - v_a) * (u_g - u_a))
                     density = f32(size * size * uv_area * abs(inverse_det) * inverse_focals)
                     identity = face_id[face]
                 flat_ids[pixel] = identity
-                ray_x = f32((x - cx) * inverse_fx)
+                ray_x = rays_x[x_first + n]
                 # Rounding must not leave the triangle: the thinner it is, the farther it would lead.
                 b1 = min(max((q1x * ray_x + q1) * z, zero), one)
                 b2 = min(max((q2x * ray_x + q2) * z, zero), one - b1)
                 b0 = one - b1 - b2
-                s[n] = attributes[i, 6] * b0 + attributes[j, 6] * b1 + attributes[k, 6] * b2
-                s[BLOCK + n] = attributes[i, 7] * b0 + attributes[j, 7] * b1 + attributes[k, 7] * b2
-                s[2 * BLOCK + n] = density * z * z * z
-                size_of[n], origin_of[n] = side, origin
+                s[U + n], s[V + n] = u_a * b0 + u_b * b1 + u_g * b2, v_a * b0 + v_b * b1 + v_g * b2
+                s[AREA + n] = density * z * z * z
+                integer[SIDE + n], integer[ORIGIN + n] = side, origin
                 if is_open:
                     is_open = False
                 else:
@@ -259,37 +236,11 @@ def shade(
                     brightness = brightness if brightness < BRIGHTNESS_KNEE else BRIGHTNESS_KNEE
                     s[11 * BLOCK + n] = (brightness + room * over / (over + room)) * f32(256)
 
-            # Mip level: the exponent of 4 in the texels per pixel, and how far it is to the next one.
+            look_up(texels, s, integer)
             for n in range(BLOCK):
-                area = s[2 * BLOCK + n]
-                area = area if area > one else one
-                s[2 * BLOCK + n] = area if area < AREA_MAX else AREA_MAX
-            for n in range(BLOCK):
-                level = (bits[2 * BLOCK + n] - np.int32(127 << 23)) >> np.int32(24)
-                bits[2 * BLOCK + n] -= level << np.int32(24)
-                level_of[n] = level
-            for n in range(BLOCK):
-                s[2 * BLOCK + n] = (np.sqrt(s[2 * BLOCK + n]) - one) * f32(256)
-
+                factors[n] = np.uint32(s[11 * BLOCK + lane_of[n]]) if integer[SIDE + n] > 0 else np.uint32(0)
             for n in range(count):
-                if face_of[n] < 0:
-                    continue
-                full = np.int64(size_of[n])
-                size, blend = full >> level_of[n], np.int64(s[2 * BLOCK + n])
-                if size < 2:
-                    size, blend = 1, 0
-                level = origin_of[n] + (full * full - size * size) // 3 * 4  # the sum of the finer levels
-                u, v = s[n], s[BLOCK + n]
-                # Texel centres lie at half integers of u * size; 8 bits of fraction. size is a power of two, so &
-                # repeats the texture.
-                wide_u = np.int64((u - np.floor(u)) * f32(size << 8)) + (size << 8)
-                wide_v = np.int64((v - np.floor(v)) * f32(size << 8)) + (size << 8)
-                fields = bilinear(texels, level, size, wide_u - 128, wide_v - 128)
-                if blend > 0:  # trilinear
-                    coarse = bilinear(texels, level + size * size, size >> 1, (wide_u >> 1) - 128, (wide_v >> 1) - 128)
-                    fields = ((fields * (256 - blend) + coarse * blend) >> 8) & FIELDS
-                factor = np.int64(s[11 * BLOCK + lane_of[n]])
-                pixel = u3 * np.uint64(y * width + x_first + n)
-                flat_rgb[pixel] = ((fields & 255) * factor) >> 8
-                flat_rgb[pixel + u1] = (((fields >> 40) & 255) * factor) >> 8
-                flat_rgb[pixel + u2] = (((fields >> 16) & 255) * factor) >> 8
+                texel, factor = natural[COLOUR + n], factors[n]
+                red_blue = (np.uint32((texel & RED_BLUE) * factor) >> np.uint32(8)) & RED_BLUE
+                green = (((texel & GREEN) >> np.uint32(8)) * factor) & GREEN
+                flat_colour[row_start + np.uint64(x_first + n)] = red_blue | green

@@ -34,10 +34,9 @@ class VisibilityBufferRenderer:
 
     Args:
         scene: objects that are no actors are posed once, at time 0.
-        camera: intrinsics and size of the images.
+        camera: intrinsics, exposure, and size of the images.
         threads: bands of rows that are drawn at the same time.
         shadow_size: side of each light's shadow map in pixels, 0 = no shadows.
-        exposure_ev: of the camera, in stops: one more makes the image twice as bright, up to the soft limit near white.
 
     Raises:
         ValueError: an argument is out of its range, or an object does not fit its own palette.
@@ -50,7 +49,6 @@ class VisibilityBufferRenderer:
         threads: int = 1,
         *,
         shadow_size: int = 1024,
-        exposure_ev: float = 0.0,
     ) -> None:
         if threads < 1 or shadow_size < 0:
             raise ValueError(f"threads must be at least 1 and shadow_size at least 0, got {threads} and {shadow_size}")
@@ -70,8 +68,9 @@ class VisibilityBufferRenderer:
         self._inverse_depth = np.zeros(shape, np.float32)
         self._triangles = np.full(shape, -1, np.int32)
         self._coverage = np.zeros(shape, np.uint32)
+        self._colour = np.zeros(shape, np.uint32)  # 0x00bbggrr, before edges are blended
         self._rendered = False
-        gain = 2.0**exposure_ev
+        gain = 2.0**camera.exposure_ev
         self._ambient = np.float32(gain * scene.ambient)
         self._lights = np.array([(*light.position_world, gain * light.power) for light in scene.lights], np.float32)
         self._lights = self._lights.reshape(-1, 4)
@@ -148,7 +147,7 @@ class VisibilityBufferRenderer:
             if any(box):
                 parts.append((actor.faces, box[:2], actor.bit if counts else np.uint32(0)))
 
-        raw, rgb = np.empty((height, width, 3), np.uint8), np.empty((height, width, 3), np.uint8)
+        rgb = np.empty((height, width, 3), np.uint8)
 
         def draw(first: int, last: int) -> None:
             self._inverse_depth[first:last] = 0
@@ -188,7 +187,7 @@ class VisibilityBufferRenderer:
                 self._lights,
                 self._ambient,
                 self._shadows.maps,
-                raw,
+                self._colour,
                 depth_m,
                 ids,
             )
@@ -201,7 +200,7 @@ class VisibilityBufferRenderer:
                 *self._lens,
                 self._triangles,
                 self._inverse_depth,
-                raw,
+                self._colour,
                 first,
                 last,
                 rgb,

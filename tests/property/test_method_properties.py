@@ -5,24 +5,25 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from scipy.spatial.transform import Rotation
 
-from dotmask.classification import classify, mask_iou
-from dotmask.evaluation.classification import ClassificationRecord, confusion
-from dotmask.evaluation.filter import chi_square_mean_bounds, normalised_squares
+from dotmask.classification import mask_iou
+from dotmask.evaluation.classification import ClassificationRecord, classification_scores
+from dotmask.evaluation.tracking import chi_square_mean_bounds, normalised_squares
 from dotmask.masking import mask_depth
+from dotmask.pipeline import DotMask, FrontEndResult
 from dotmask.profiles import CALIBRATED, PAPER, PROFILES
-from dotmask.records import Detections, Intrinsics, MaskedDepth, Observation, RgbdFrame, Track
+from dotmask.records import Detections, Intrinsics, Observation, RgbdFrame
 from dotmask.segmentation.selection import select_detections
+from dotmask.tracking.association import associate
 from dotmask.tracking.ekf import initiate, update
-from dotmask.tracking.measurement import observe
-from dotmask.tracking.measurement_model import CAMERA_POINT
+from dotmask.tracking.measurement_model import CAMERA_POINT, PixelDepth
 from dotmask.tracking.motion_model import predict
-from dotmask.tracking.tracker import TrackerState, track_objects
 
+CAMERA = Intrinsics(width=320, height=240, fx=262.5, fy=262.5, cx=159.5, cy=119.5)
 ONE = Detections(masks=np.ones((1, 2, 2), bool), boxes_px=np.zeros((1, 4)), class_names=("chair",), scores=np.ones(1))
 
 # ---- the filter on its own model ----------------------------------------------------------------
@@ -76,31 +77,60 @@ def test_nees_and_nis_are_consistent_on_the_exact_model(profile, class_name) -> 
     assert low < np.mean(nees) < high
 
 
-finite = st.floats(-5, 5)
-
-
-@settings(max_examples=60, deadline=None)
-@given(
-    positions=st.lists(st.one_of(st.none(), st.tuples(finite, finite, st.floats(0.3, 8))), min_size=2, max_size=12),
-    sigma=st.floats(1e-4, 1.0),
-    dt=st.floats(1e-3, 1.0),
-    angle=finite,
+shares = st.floats(0, 1)
+steps_of_a_filter = st.lists(
+    st.tuples(
+        shares,  # of the powers of ten of the time step
+        st.tuples(shares, shares, shares),  # and of the axes of R
+        st.tuples(*[st.floats(-3, 3)] * 3),  # turn of these axes
+        st.tuples(*[st.floats(-2, 2)] * 3),  # where the observation lies beside the prediction
+        st.booleans(),  # whether there is one
+    ),
+    min_size=1,
+    max_size=12,
 )
-def test_the_covariance_stays_symmetric_and_positive_definite(positions, sigma, dt, angle) -> None:
+
+
+@pytest.mark.parametrize(
+    ("model", "least", "most"),
+    [(CAMERA_POINT, -5, 2), (PixelDepth(intrinsics=CAMERA), -4, 1)],
+    ids=["CameraPoint", "PixelDepth"],
+)
+@settings(max_examples=100, phases=[Phase.generate])
+@given(
+    steps=steps_of_a_filter,
+    turn=st.tuples(*[st.floats(-3, 3)] * 3),
+    shift=st.tuples(*[st.floats(-1000, 1000)] * 3),
+)
+def test_the_covariance_stays_symmetric_and_positive_definite(steps, turn, shift, model, least, most) -> None:
+    """For any camera, and R and time steps between powers of ten; the model that is not linear inside the gate only."""
     T = np.eye(4)
-    T[:3, :3] = Rotation.from_rotvec([0.3, angle, -0.2]).as_matrix()
-    start = Observation(
-        position_camera=np.array([0, 0, 2.0]),
-        covariance=sigma**2 * np.eye(3),
-        class_name="person",
-        detection_index=0,
-        model=CAMERA_POINT,
-    )
-    track = initiate(start, ONE, 0.0, T, CALIBRATED, 1)
-    for k, position in enumerate(positions):
-        track = predict(track, (k + 1) * dt, CALIBRATED)
-        if position is not None:
-            track = update(track, replace(start, position_camera=np.array(position)), ONE, T)
+    T[:3, :3] = Rotation.from_rotvec(turn).as_matrix()
+    T[:3, 3] = shift
+
+    def power(share):
+        return 10.0 ** (least + share * (most - least))
+
+    to_units = np.diag([100.0, 100.0, 1.0] if model is not CAMERA_POINT else [1.0, 1.0, 1.0])
+
+    def seen(position, sigmas, axes) -> Observation:
+        root = to_units @ Rotation.from_rotvec(axes).as_matrix() @ np.diag(power(np.array(sigmas)))
+        return Observation(
+            position_camera=np.array([*position[:2], max(position[2], 0.3)]),
+            covariance=root @ root.T,
+            class_name="person",
+            detection_index=0,
+            model=model,
+        )
+
+    timestamp_s = 0.0
+    track = initiate(seen((0.0, 0.0, 2.0), *steps[0][1:3]), ONE, timestamp_s, T, CALIBRATED, 1)
+    for dt, sigmas, axes, beside, is_seen in steps:
+        timestamp_s += power(dt)
+        track = predict(track, timestamp_s, CALIBRATED)
+        observation = seen(T[:3, :3].T @ (track.position_world - T[:3, 3]) + beside, sigmas, axes)
+        if is_seen and (model is CAMERA_POINT or associate([track], [observation], T, CALIBRATED).pairs):
+            track = update(track, observation, ONE, T)
         np.testing.assert_array_equal(track.covariance, track.covariance.T)
         assert np.linalg.eigvalsh(track.covariance).min() > 0
 
@@ -121,7 +151,7 @@ def detections_of(masks, scores=None) -> Detections:
     )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(depth=depths, masks=masks_of_three, moving=st.lists(st.booleans(), min_size=3, max_size=3))
 def test_masking_only_removes_and_a_second_time_changes_nothing(depth, masks, moving) -> None:
     detections = detections_of(masks)
@@ -135,7 +165,7 @@ def test_masking_only_removes_and_a_second_time_changes_nothing(depth, masks, mo
     np.testing.assert_array_equal(mask_depth(once.mdi_m, detections, moving, (), CALIBRATED).mdi_m, once.mdi_m)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     depth=depths,
     masks=masks_of_three,
@@ -149,13 +179,13 @@ def test_masks_do_not_depend_on_the_order_of_the_detections(depth, masks, moving
     np.testing.assert_array_equal(one.mdi_m, other.mdi_m)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(masks=hnp.arrays(np.bool_, (2, *SIZE)), alignment=st.sampled_from(["none", "box"]))
 def test_iou_lies_between_zero_and_one(masks, alignment) -> None:
     assert 0.0 <= mask_iou(masks[0], masks[1], alignment) <= 1.0
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(scores=st.lists(st.sampled_from([0.05, 0.3, 0.5, 0.9]), min_size=1, max_size=14), data=st.data())
 def test_selection_does_not_depend_on_the_order_in_which_a_segmenter_lists(scores, data) -> None:
     count = len(scores)
@@ -169,7 +199,6 @@ def test_selection_does_not_depend_on_the_order_in_which_a_segmenter_lists(score
 
 # ---- a small world: people and chairs as pictures with depth -----------------------------------------
 
-CAMERA = Intrinsics(width=320, height=240, fx=262.5, fy=262.5, cx=159.5, cy=119.5)
 RATE_HZ = 30
 MOVING_IDS = (1, 2)
 
@@ -261,29 +290,24 @@ def picture(index: int, *, walking: bool = True) -> Picture:
     return Picture(frame, detections, tuple(seen), T, velocities)
 
 
-@dataclass(frozen=True)
-class Step:
-    """What the method made of one picture; `detections` and `tracks` as it ordered them."""
-
-    detections: Detections
-    tracks: tuple[Track, ...]
-    masked: MaskedDepth
+UNMOVED = np.eye(4)
 
 
-def run(pictures, profile, order=None):
-    state, steps = TrackerState(), []
-    for p in pictures:
-        listed = p.detections if order is None else p.detections.select(order(len(p.detections)))
-        detections = select_detections(listed, profile)
-        observations = observe(detections, p.frame, profile)
-        after = track_objects(state, observations, detections, p.frame.timestamp_s, p.T_world_camera, profile)
-        known = {t.track_id: t for t in state.tracks}
-        tracks = tuple(replace(t, verdict=classify(t, known.get(t.track_id), profile)) for t in after.tracks)
-        state = replace(after, tracks=tracks)
-        moving = {t.detection_index for t in tracks if t.verdict is not None and t.verdict.is_moving}
-        flags = [i in moving for i in range(len(detections))]
-        steps.append(Step(detections, tracks, mask_depth(p.frame.depth_m, detections, flags, tracks, profile)))
-    return steps
+class Playback:
+    """A segmenter that answers with what was found before."""
+
+    def __init__(self, found: dict[int, Detections]) -> None:
+        self._found = found
+
+    def segment(self, frame: RgbdFrame) -> Detections:
+        return self._found[frame.index]
+
+
+def run(pictures, profile, order=np.arange, T_moved_world=UNMOVED) -> list[FrontEndResult]:
+    """What the method makes of pictures that list their detections in some order, in a world that was moved."""
+    found = {p.frame.index: p.detections.select(order(len(p.detections))) for p in pictures}
+    method = DotMask(Playback(found), profile)
+    return [method.step(p.frame, T_moved_world @ p.T_world_camera) for p in pictures]
 
 
 @pytest.fixture(scope="module")
@@ -325,18 +349,8 @@ def test_walkers_are_flagged_and_standing_chairs_are_not(pictures, calibrated) -
         if not is_new:
             flagged = track.verdict.is_moving
             moving = instance in MOVING_IDS
-            records.append(
-                ClassificationRecord(
-                    frame=k,
-                    instance_id=instance,
-                    class_name=track.class_name,
-                    is_moving=moving,
-                    true_speed_m_s=float(np.linalg.norm(pictures[k].velocities[instance])),
-                    is_flagged=flagged,
-                    speed_m_s=track.verdict.speed_m_s,
-                )
-            )
-    scores = confusion(records)
+            records.append(ClassificationRecord(frame=k, instance_id=instance, is_moving=moving, is_flagged=flagged))
+    scores = classification_scores(records)
     assert scores.recall is not None
     assert scores.precision is not None
     assert scores.recall >= 0.95
@@ -358,14 +372,63 @@ def test_each_object_keeps_its_track(pictures, calibrated) -> None:
     assert sum(len(ids) - 1 for ids in owners.values()) <= 1
 
 
+def assert_same_but_for_the_world(one: FrontEndResult, other: FrontEndResult) -> None:
+    """Ids, verdicts, masks and images are the same; positions may not be."""
+    np.testing.assert_array_equal(one.masked.mo_mdi_m, other.masked.mo_mdi_m)
+    np.testing.assert_array_equal(one.masked.mdi_m, other.masked.mdi_m)
+    for a, b in zip(one.tracks, other.tracks, strict=True):
+        assert (a.track_id, a.class_name, a.age_frames, a.misses, a.detection_index) == (
+            (b.track_id, b.class_name, b.age_frames, b.misses, b.detection_index)
+        )
+        np.testing.assert_array_equal(a.mask, b.mask)
+        assert a.verdict is not None
+        assert b.verdict is not None
+        assert (a.verdict.is_moving, a.verdict.reason, a.verdict.mask_iou, a.verdict.calm_frames) == (
+            (b.verdict.is_moving, b.verdict.reason, b.verdict.mask_iou, b.verdict.calm_frames)
+        )
+
+
+@pytest.mark.parametrize("has_equal_scores", [False, True], ids=["unequal scores", "equal scores"])
 @pytest.mark.parametrize("profile", PROFILES, ids=lambda p: p.name)
-def test_shuffled_detections_leave_the_images_for_slam_unchanged(pictures, profile) -> None:
-    rng = np.random.default_rng(8)
-    straight = run(pictures[:25], profile)
-    shuffled = run(pictures[:25], profile, order=rng.permutation)
-    for one, other in zip(straight, shuffled, strict=True):
-        np.testing.assert_array_equal(one.masked.mo_mdi_m, other.masked.mo_mdi_m)
-        np.testing.assert_array_equal(one.masked.mdi_m, other.masked.mdi_m)
+def test_nothing_depends_on_the_order_in_which_a_segmenter_lists(pictures, profile, has_equal_scores) -> None:
+    listed = pictures[:25]
+    if has_equal_scores:
+        listed = [replace(p, detections=replace(p.detections, scores=np.ones(len(p.detections)))) for p in listed]
+    shuffle = np.random.default_rng(8).permutation
+    for one, other in zip(run(listed, profile), run(listed, profile, order=shuffle), strict=True):
+        assert_same_but_for_the_world(one, other)
+        for a, b in zip(one.tracks, other.tracks, strict=True):
+            np.testing.assert_array_equal(a.mean, b.mean)
+            np.testing.assert_array_equal(a.covariance, b.covariance)
+
+
+metres = st.floats(-200, 200)
+
+
+@pytest.mark.parametrize("profile", PROFILES, ids=lambda p: p.name)
+@settings(max_examples=5, phases=[Phase.generate])
+@given(heading=st.floats(-3, 3), tilt=st.tuples(st.floats(-3, 3), st.floats(-3, 3)), shift=st.tuples(*[metres] * 3))
+def test_a_moved_world_moves_the_tracks_and_changes_nothing_else(pictures, profile, heading, tilt, shift) -> None:
+    """By any rigid motion where all axes are alike, else by one that keeps z up."""
+    has_up = any(model.vertical_share != 1.0 for model in profile.classes)
+    T = np.eye(4)
+    T[:3, :3] = Rotation.from_rotvec([*((0.0, 0.0) if has_up else tilt), heading]).as_matrix()
+    T[:3, 3] = shift
+    turn = np.kron(np.eye(2), T[:3, :3])
+    for one, other in zip(run(pictures[:25], profile), run(pictures[:25], profile, T_moved_world=T), strict=True):
+        assert_same_but_for_the_world(one, other)
+        for a, b in zip(one.tracks, other.tracks, strict=True):
+            np.testing.assert_allclose(b.mean, turn @ a.mean + [*shift, 0, 0, 0], atol=1e-8)
+            np.testing.assert_allclose(b.covariance, turn @ a.covariance @ turn.T, atol=1e-10)
+
+
+@pytest.mark.parametrize("profile", PROFILES, ids=lambda p: p.name)
+def test_odometry_keeps_what_the_map_keeps_and_nothing_is_added(pictures, profile) -> None:
+    for p, result in zip(pictures, run(pictures, profile), strict=True):
+        for image in (result.masked.mo_mdi_m, result.masked.mdi_m):
+            assert ((image == p.frame.depth_m) | (image == 0)).all()
+        is_mapped = result.masked.mdi_m > 0
+        np.testing.assert_array_equal(result.masked.mo_mdi_m[is_mapped], p.frame.depth_m[is_mapped])
 
 
 def test_people_and_chairs_that_stand_still_end_up_idle() -> None:

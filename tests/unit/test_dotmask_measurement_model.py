@@ -5,16 +5,14 @@ import pytest
 
 from dotmask.geometry import inverse
 from dotmask.profiles import PAPER
-from dotmask.records import Detections, Intrinsics, Observation, Track
+from dotmask.records import Intrinsics, Observation, Track
 from dotmask.tracking.ekf import initiate, innovate, measurement_jacobian, update
 from dotmask.tracking.measurement_model import CAMERA_POINT, PixelDepth
 
 CAMERA = Intrinsics(width=640, height=480, fx=535.4, fy=539.2, cx=320.1, cy=247.6)
 PIXEL_DEPTH = PixelDepth(intrinsics=CAMERA)
 POINTS = np.array([[0.3, -0.2, 2.0], [-1.1, 0.4, 3.7], [0.05, 0.9, 0.6]])
-ONE = Detections(
-    masks=np.ones((1, 4, 4), np.bool_), boxes_px=np.array([[0, 0, 3, 3.0]]), class_names=("person",), scores=np.ones(1)
-)
+MASK = np.ones((4, 4), bool)
 
 
 def pose(seed: int) -> np.ndarray:
@@ -70,16 +68,18 @@ def test_near_the_truth_both_models_lead_to_the_same_belief() -> None:
 
     def seen(p_camera: np.ndarray, model: PixelDepth) -> Observation:
         R = R_point if model is CAMERA_POINT else J @ R_point @ J.T
-        return Observation(position_camera=p_camera, covariance=R, class_name="person", detection_index=0, model=model)
+        return Observation(
+            position_camera=p_camera, covariance=R, class_name="person", detection_index=0, mask=MASK, model=model
+        )
 
     def updated(model: PixelDepth) -> Track:
-        born = initiate(seen(POINTS[0], model), ONE, 0.0, T, PAPER, 1)
-        return update(born, seen(POINTS[0] + 1e-3, model), ONE, T)
+        born = initiate(seen(POINTS[0], model), 0.0, T, PAPER, 1)
+        return update(born, seen(POINTS[0] + 1e-3, model), None, T, PAPER)
 
     linear, pixels = updated(CAMERA_POINT), updated(PIXEL_DEPTH)
     np.testing.assert_allclose(pixels.mean, linear.mean, atol=5e-6)
     np.testing.assert_allclose(pixels.covariance, linear.covariance, atol=1e-8)
-    born = initiate(seen(POINTS[0], PIXEL_DEPTH), ONE, 0.0, T, PAPER, 1)
+    born = initiate(seen(POINTS[0], PIXEL_DEPTH), 0.0, T, PAPER, 1)
     innovation = innovate(born, seen(POINTS[0] + 1e-3, PIXEL_DEPTH), T)
     expected = PIXEL_DEPTH.measured(POINTS[0] + 1e-3) - PIXEL_DEPTH.measured(POINTS[0])
     np.testing.assert_allclose(innovation.residual, expected, atol=1e-9)

@@ -2,31 +2,59 @@ import numpy as np
 import pytest
 
 from dotmask.profiles import CALIBRATED, PAPER
-from dotmask.records import Track
-from dotmask.tracking.motion_model import predict, process_noise, transition
+from dotmask.records import Innovation, SurfaceMotion, Track, TrackPhase
+from dotmask.tracking.motion_model import predict, process_noise, slide_variance, transition
 
 
-def track_at(mean, covariance=None, class_name="chair") -> Track:
+def track_at(mean, covariance=None, class_name="chair", *, is_partial=False, phase=TrackPhase.CONFIRMED) -> Track:
     return Track(
         track_id=1,
         class_name=class_name,
         timestamp_s=2.0,
         mean=np.asarray(mean, float),
         covariance=0.01 * np.eye(6) if covariance is None else covariance,
-        age_frames=4,
+        hits=4,
         misses=0,
+        phase=phase,
         detection_index=0,
         mask=np.zeros((4, 4), bool),
         mask_timestamp_s=2.0,
-        partial_timestamp_s=2.0,
+        mask_position_camera=np.array([0, 0, 1.0]),
+        partial_timestamp_s=2.0 if is_partial else 1.0,
+        innovation=Innovation(residual=np.zeros(3), covariance=np.eye(3)),
+        surface=SurfaceMotion(points=9, moving_share=0.5, velocity_world=np.ones(3), covariance=np.eye(3)),
     )
 
 
 def test_prediction_moves_with_the_velocity_and_counts_a_miss() -> None:
     after = predict(track_at([1, 2, 3, 0.5, -1, 0.25]), 2.5, PAPER)
     np.testing.assert_allclose(after.mean, [1.25, 1.5, 3.125, 0.5, -1, 0.25], rtol=0, atol=1e-15)
-    assert (after.timestamp_s, after.age_frames, after.misses, after.detection_index) == (2.5, 5, 1, None)
-    assert after.innovation is None
+    assert (after.timestamp_s, after.hits, after.misses, after.detection_index) == (2.5, 4, 1, None)
+    assert (after.innovation, after.surface) == (None, None), "they are of a frame, and this frame was not looked at"
+    assert (after.mask_timestamp_s, after.partial_timestamp_s) == (2.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        (TrackPhase.TENTATIVE, TrackPhase.TENTATIVE),
+        (TrackPhase.CONFIRMED, TrackPhase.COASTING),
+        (TrackPhase.COASTING, TrackPhase.COASTING),
+    ],
+)
+def test_a_track_coasts_until_it_is_seen_and_a_tentative_one_stays_tentative(before, after) -> None:
+    assert predict(track_at(np.zeros(6), phase=before), 2.1, PAPER).phase is after
+
+
+@pytest.mark.parametrize("class_name", ["chair", "person", "cup"])
+def test_the_measured_point_of_a_half_hidden_object_may_slide_over_it(class_name) -> None:
+    sigma = CALIBRATED.class_model(class_name).slide_sigma_m
+    whole, hidden = (track_at(np.zeros(6), class_name=class_name, is_partial=p) for p in (False, True))
+    added = predict(hidden, 2.25, CALIBRATED).covariance - predict(whole, 2.25, CALIBRATED).covariance
+    # sigma metres per root second: the position alone, so that the velocity is not dragged along.
+    np.testing.assert_allclose(added, np.diag([sigma**2 * 0.25] * 3 + [0.0] * 3), rtol=0, atol=1e-15)
+    assert slide_variance(hidden, 2.25, CALIBRATED) == pytest.approx(sigma**2 * 0.25)
+    np.testing.assert_array_equal(predict(hidden, 2.25, PAPER).covariance, predict(whole, 2.25, PAPER).covariance)
 
 
 def test_covariance_is_f_p_ft_plus_q() -> None:

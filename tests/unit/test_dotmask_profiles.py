@@ -3,7 +3,7 @@ from dataclasses import replace
 import pytest
 
 from dotmask.errors import ProfileError
-from dotmask.profiles import CALIBRATED, PAPER, PROFILES, profile
+from dotmask.profiles import CALIBRATED, PAPER, PROFILES, MaskGrowth, profile
 
 
 def test_paper_profile_holds_table_one() -> None:
@@ -41,7 +41,8 @@ def test_unknown_class_is_refused() -> None:
     [
         ({"max_misses": 0}, "max_misses must be at least 1"),
         ({"gate_probability": 1.0}, "probabilities"),
-        ({"dilation_px": -1}, "not be negative"),
+        ({"confirming_hits": 0}, "confirming_hits must be at least 1"),
+        ({"coasting_mask_frames": -1}, "not be negative"),
     ],
 )
 def test_values_out_of_range_are_refused(change, message) -> None:
@@ -52,3 +53,16 @@ def test_values_out_of_range_are_refused(change, message) -> None:
 def test_class_model_refuses_a_zero_sigma() -> None:
     with pytest.raises(ValueError, match="sigmas must be positive"):
         replace(PAPER.classes[0], acceleration_sigma_m_s2=0.0)
+
+
+@pytest.mark.parametrize("name", ["base_px", "margin_m", "depth_delay_s"])
+def test_masks_do_not_shrink(name) -> None:
+    with pytest.raises(ValueError, match="must not be negative"):
+        MaskGrowth(**{"base_px": 1.0, name: -0.1})
+
+
+def test_the_papers_profile_leaves_out_what_is_not_in_the_paper() -> None:
+    assert PAPER.surface is None
+    assert (PAPER.reappearance_m, PAPER.least_mask_likelihood, PAPER.coasting_mask_frames) == (0.0, 1.0, 0)
+    assert (PAPER.aligns_masks, PAPER.calm_frames, PAPER.speed_confidence) == (False, 1, 0.0)
+    assert all(m.slide_sigma_m == 0 and m.shape_sigma_m == (0, 0, 0) for m in PAPER.classes)

@@ -241,6 +241,28 @@ def test_it_agrees_with_the_default_renderer_on_light_shadows_texture_and_skinni
             assert one.unoccluded_pixels(actor) == pytest.approx(other.unoccluded_pixels(actor), abs=3)
 
 
+@pytest.mark.parametrize("exposure_ev", [-2.0, 1.5])
+def test_it_agrees_with_the_default_renderer_on_exposure(exposure_ev: float) -> None:
+    camera = replace(CAMERA, exposure_ev=exposure_ev)
+    ours, theirs, plain = (
+        renderer.render(MOMENT).rgb.astype(int)
+        for renderer in (
+            PyrenderRenderer(SCENE, camera),
+            VisibilityBufferRenderer(SCENE, camera),
+            PyrenderRenderer(SCENE, CAMERA),
+        )
+    )
+    difference = np.abs(ours - theirs)
+    assert np.median(difference.max(axis=2)) <= 2
+    assert difference.mean() < 1.4 * max(theirs.mean() / plain.mean(), 1)
+    assert np.abs(ours - plain).mean() > 20
+
+
+def test_a_stop_less_is_half_as_bright() -> None:
+    bright, dark = (PyrenderRenderer(SCENE, replace(CAMERA, exposure_ev=ev)).render(MOMENT).rgb for ev in (-2.0, -3.0))
+    np.testing.assert_allclose(dark, bright / 2.0, atol=1)  # all of it below the soft limit
+
+
 def test_shadows_move_with_their_casters() -> None:
     renderer = PyrenderRenderer(SCENE, CAMERA)
     away = at(EYE, ball=pose(np.eye(3), (0, 0, -9))[None], strip=pose(np.eye(3), (0, 0, -9))[None].repeat(2, 0))

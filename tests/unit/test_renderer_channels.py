@@ -217,7 +217,7 @@ def digest(images: RenderedImages) -> str:
 
 
 def digest_of_all_channels(threads: int = 1) -> str:
-    renderer = VisibilityBufferRenderer(scene(), CAMERA, threads=threads, exposure_ev=0.3)
+    renderer = VisibilityBufferRenderer(scene(), replace(CAMERA, exposure_ev=0.3), threads=threads)
     return digest(renderer.render(moment(0.2), normals=True, flow_to=moment(0.5)))
 
 

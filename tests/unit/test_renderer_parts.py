@@ -51,3 +51,12 @@ def test_mip_levels_are_means() -> None:
     last = atlas.texels[20]
     mean = image.reshape(-1, 3).mean(0)
     np.testing.assert_allclose([last & 255, last >> 8 & 255, last >> 16], mean, atol=1)
+
+
+def test_texels_lie_in_tiles_of_one_cache_line() -> None:
+    image = np.zeros((8, 8, 3), np.uint8)
+    image[..., 0] = np.arange(64).reshape(8, 8)  # 8 v + u
+    tiles = TextureAtlas.of([image]).texels[:64].reshape(4, 16)
+    for tile, (v, u) in zip(tiles, [(0, 0), (0, 4), (4, 0), (4, 4)], strict=True):
+        np.testing.assert_array_equal(np.sort(tile), np.sort(image[v : v + 4, u : u + 4, 0].ravel()))
+    np.testing.assert_array_equal(tiles[0], [0, 1, 8, 9, 2, 3, 10, 11, 16, 17, 24, 25, 18, 19, 26, 27])

@@ -18,6 +18,7 @@ from dotmask.records import (
     RgbdFrame,
     SlamStatus,
     Track,
+    TrackPhase,
     Verdict,
 )
 from scenarios.judge import Judge
@@ -63,11 +64,13 @@ def track(track_id: int, detection: int, name: str, mask: np.ndarray, time_s: fl
         timestamp_s=time_s,
         mean=np.array([0, 0, 2.8, speed, 0, 0]),
         covariance=np.eye(6),
-        age_frames=2,
+        hits=2,
         misses=0,
+        phase=TrackPhase.CONFIRMED,
         detection_index=detection,
         mask=mask,
         mask_timestamp_s=time_s,
+        mask_position_camera=np.array([0, 0, 2.8]),
         partial_timestamp_s=time_s,
         innovation=Innovation(residual=np.array([1.0, 0, 0]), covariance=np.eye(3)),
         verdict=Verdict(is_moving=flag, reason=Reason.SPEED, speed_m_s=speed, mask_iou=None),

@@ -2,6 +2,7 @@ import json
 
 import pytest
 
+from scenarios.camera import camera_model
 from scenarios.errors import ScenarioError
 from scenarios.registry import SCENARIOS, scenario
 from scenarios.spec import PersonSpec, Scenario, StandAct, WalkLoopAct, scenario_from_json, with_overrides
@@ -28,12 +29,19 @@ def test_an_override_reaches_a_nested_value_and_leaves_the_original() -> None:
         ("camera.speed", "NaN", r"camera.speed: .*finite"),
         ("frames", "0", r"frames: .*greater than or equal to 1"),
         ("frames", "2.5", r"frames: .*valid integer"),
+        ("camera.exposure_ev", "5", r"camera.exposure_ev: .*less than or equal to 4"),
         ("camera.path", "zigzag", r"camera.path: .*'static', 'xyz', 'rpy', 'halfsphere'"),
     ],
 )
 def test_a_bad_override_names_the_field_and_what_is_valid(key: str, value: str, message: str) -> None:
     with pytest.raises(ScenarioError, match=message):
         with_overrides(scenario("smoke"), {key: value})
+
+
+@pytest.mark.parametrize("name", ["smoke", "fr2_desk", "robot_corridor", "robot_follows_person"])
+def test_every_camera_has_an_exposure(name: str) -> None:
+    assert camera_model(scenario(name).camera).exposure_ev == 0.0
+    assert camera_model(with_overrides(scenario(name), {"camera.exposure_ev": "-1"}).camera).exposure_ev == -1.0
 
 
 def test_an_unknown_scenario_names_near_matches() -> None:

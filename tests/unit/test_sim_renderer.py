@@ -87,45 +87,6 @@ def room() -> SceneObject:
     return thing(*parts, name="room", number=0)
 
 
-@pytest.mark.parametrize("distance_m", [0.5, 1.0, 2.5, 6.0])
-@pytest.mark.parametrize("normal", [(0.0, 0.0, 1.0), (0.5, 0.1, 0.8), (-0.2, 0.6, 0.7)])
-def test_depth_of_a_plane_is_exact(distance_m: float, normal: tuple[float, float, float]) -> None:
-    n = np.array(normal) / np.linalg.norm(normal)
-    w, h = CAMERA.width, CAMERA.height
-    edge = np.array([[-9, -9], [-9, h + 9], [w + 9, h + 9], [w + 9, -9]], float)
-    edge_rays = np.c_[(edge - [CAMERA.cx, CAMERA.cy]) / [CAMERA.fx, CAMERA.fy], np.ones(4)]
-    offset = distance_m * n[2]
-    corners = edge_rays * (offset / (edge_rays @ n))[:, None]
-    images = draw(thing(quad(*corners)))
-    error_m = np.abs(images.depth_m - offset / (rays() @ n))
-    near = images.depth_m < 8.0
-    assert images.depth_m.dtype == np.float32
-    assert (images.depth_m > 0).all()
-    assert np.median(error_m[near]) < 1e-5
-    assert error_m[near].max() < 5e-5
-
-
-def test_depth_of_a_sphere_is_exact() -> None:
-    centre, radius, n = np.array([0.1, -0.05, 1.6]), 0.4, 400
-    phi, theta = np.meshgrid(np.linspace(0, np.pi, n // 2 + 1), np.linspace(0, 2 * np.pi, n + 1), indexing="ij")
-    normals = np.stack([np.sin(phi) * np.cos(theta), np.sin(phi) * np.sin(theta), np.cos(phi)], -1).reshape(-1, 3)
-    number = np.arange(normals.shape[0]).reshape(phi.shape)
-    a, b, c, d = (x.ravel() for x in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]))
-    faces = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
-    images = draw(thing(surface(centre + radius * normals, faces, normals=normals)))
-    r = rays()
-    half, squared = (r * centre).sum(-1), (r * r).sum(-1)
-    inside = half**2 - squared * (centre @ centre - radius**2)
-    truth = (half - np.sqrt(np.maximum(inside, 0))) / squared
-    facing = -((r * truth[..., None] - centre) * r).sum(-1) / radius / np.sqrt(squared)
-    seen = (inside > 0) & (facing > 0.3)  # near the outline a mesh is no sphere
-    error_m = np.abs(images.depth_m - truth)[seen]
-    assert seen.sum() > 2000
-    assert np.median(error_m) < 1e-5 + 0.4 * (np.pi / n) ** 2 / 2  # sagitta of a facet
-    assert error_m.max() < 2e-4
-    assert ((images.depth_m > 0) == (inside > 0)).mean() > 0.999
-
-
 @pytest.mark.parametrize("z", [0.7, 3.0])
 def test_pixel_centres_lie_at_integers(z: float) -> None:
     images = draw(thing(pixel_quad(9.99, 4.51, 20.01, 8.49, z)))
@@ -243,7 +204,7 @@ def test_a_stop_of_exposure_doubles_the_brightness() -> None:
     light = Light(position_world=(0.0, 0.0, 1.0), power=0.3)
     scene = Scene(objects=(thing(pixel_quad(-1, -1, 200, 200, 2.0)),), lights=(light,), ambient=0.1)
     dark, bright = (
-        draw_moment(VisibilityBufferRenderer(scene, CAMERA, exposure_ev=ev), AT_ORIGIN, {}).rgb.astype(int)
+        draw_moment(VisibilityBufferRenderer(scene, replace(CAMERA, exposure_ev=ev)), AT_ORIGIN, {}).rgb.astype(int)
         for ev in (0.0, 1.0)
     )
     assert bright.max() < 200 * 0.7  # below the soft limit

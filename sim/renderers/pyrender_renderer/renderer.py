@@ -56,7 +56,7 @@ class PyrenderRenderer:
 
     Args:
         scene: objects that are no actors are posed once, at time 0.
-        camera: intrinsics and size of the images.
+        camera: intrinsics, exposure, and size of the images.
 
     Raises:
         RendererMissingError: no OpenGL library; the message says what to install.
@@ -73,14 +73,15 @@ class PyrenderRenderer:
             if not 0 <= obj.instance_id <= np.iinfo(np.uint16).max:
                 raise ValueError(f"{obj.name}: instance id {obj.instance_id} does not fit into 16 bits")
 
-        self._scene = OrderedScene(ambient_light=[scene.ambient] * 3, bg_color=[0.0, 0.0, 0.0, 1.0])
+        gain = 2.0**camera.exposure_ev
+        self._scene = OrderedScene(ambient_light=[gain * scene.ambient] * 3, bg_color=[0.0, 0.0, 0.0, 1.0])
         # OpenGL's centre of pixel (0, 0) is (0.5, 0.5).
         lens = pyrender.IntrinsicsCamera(camera.fx, camera.fy, camera.cx + 0.5, camera.cy + 0.5, NEAR_M, FAR_M)
         self._camera_node = self._scene.add(lens)
         for number, light in enumerate(scene.lights):
             T_world_light = np.eye(4)  # OpenGL looks along -z: straight down
             T_world_light[:3, 3] = light.position_world
-            self._scene.add(CeilingLight(intensity=light.power), name=f"light {number}", pose=T_world_light)
+            self._scene.add(CeilingLight(intensity=gain * light.power), name=f"light {number}", pose=T_world_light)
 
         self._materials: dict[int, pyrender.Material] = {}
         room = [
