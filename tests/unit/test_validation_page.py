@@ -52,7 +52,7 @@ def test_a_quick_section_says_so(tmp_path, sections) -> None:
 
 def test_an_unknown_section_is_named(tmp_path) -> None:
     with pytest.raises(ScenarioError, match="consistency"):
-        write(tmp_path / "page", only=("consistancy",))
+        write(tmp_path / "page", only=("consist",))
     assert not (tmp_path / "page").exists()
 
 
