@@ -66,7 +66,8 @@ def classify(track: Track, previous: Track | None, profile: Profile) -> Verdict:
         return Verdict(is_moving=True, reason=reason, speed_m_s=speed, mask_iou=iou, calm_frames=0)
 
     calm = (before.calm_frames if before is not None else 0) + speaks_for_rest
-    if calm >= profile.calm_frames or (before is not None and before.reason is Reason.IDLE):
+    needed = profile.calm_frames if was_moving else profile.proof_frames
+    if calm >= needed or (before is not None and before.reason is Reason.IDLE):
         return Verdict(is_moving=False, reason=Reason.IDLE, speed_m_s=speed, mask_iou=iou, calm_frames=calm)
     if before is None or before.reason is Reason.NEW:
         is_masked = profile.unknown_policy == "mask"

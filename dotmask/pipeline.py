@@ -172,7 +172,7 @@ class DotMask:
             detections = select_detections(self._segmenter.segment(frame), self._profile)
         with clock("track"):
             observations = observe(detections, frame, self._profile)
-            points = self._follow(frame, detections)
+            points = self._follow(frame, detections, T_world_camera)
             after = self._track(before, frame, detections, observations, points, T_world_camera)
         with clock("classify"):
             after = self._classify(before, after)
@@ -222,13 +222,13 @@ class DotMask:
         elapsed_s = frame.timestamp_s - self._kept.frame.timestamp_s
         return np.asarray((T_world_camera[:3, 3] - self._kept.T_world_camera[:3, 3]) / elapsed_s)
 
-    def _follow(self, frame: RgbdFrame, detections: Detections) -> SurfacePoints | None:
+    def _follow(self, frame: RgbdFrame, detections: Detections, T_world_camera: FloatArray) -> SurfacePoints | None:
         settings, kept = self._profile.surface, self._kept
         if settings is None:
             return None
         # The pose of the frame before is known by now as well as it will ever be.
         before, T_world_camera_before = (None, None) if kept is None else (kept.points, kept.T_world_camera)
-        return follow(before, frame, detections, T_world_camera_before, settings)
+        return follow(before, frame, detections, T_world_camera_before, T_world_camera, settings)
 
     def _track(
         self,
