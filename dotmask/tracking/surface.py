@@ -28,11 +28,11 @@ _MOST_DIFFERENCE = 8.0
 _BORDER = np.ones((5, 5), np.uint8)
 """Points keep off a mask's border by two pixels of the half size image: there, the background moves with them."""
 _CORNER_QUALITY, _CORNER_DISTANCE_PX, _HARRIS_K = 0.001, 4, 0.04
-"""By the measure of Harris and Stephens (1988), which refuses edges: along the stripes of a shirt a point would slide."""
+"""By the measure of Harris and Stephens (1988), which refuses edges: a point would slide along a stripe."""
 _SPREAD = 0.6
 """Corners keep this share of the distance that they would have if they were spread evenly: they are found on the arms
 as well as on the print of a shirt."""
-_REFILL_BELOW = 0.85
+_REFILL_BELOW = 0.75
 """New corners are looked for when fewer than this share of the wanted points is left."""
 _DEPTH_JUMP_M = 0.3
 """A point whose depth changes by more from one frame to the next has slipped off its object."""
@@ -291,7 +291,8 @@ def _lift(pixels: npt.NDArray[np.float32], depth_m: DepthImage, intrinsics: Intr
     height, width = depth_m.shape
     u = np.clip(np.rint(full[:, 0]).astype(np.intp), 1, width - 2)
     v = np.clip(np.rint(full[:, 1]).astype(np.intp), 1, height - 2)
-    around = np.stack([depth_m[v + dv, u + du] for dv in (-1, 0, 1) for du in (-1, 0, 1)], axis=1).astype(np.float64)
+    neighbours = (np.arange(-1, 2)[:, None] * width + np.arange(-1, 2)).ravel()
+    around = depth_m.ravel()[(v * width + u)[:, None] + neighbours].astype(np.float64)
     centre = around[:, 4]
     is_same = (around > 0) & (np.abs(around - centre[:, None]) < _DEPTH_STEP_M)
     count = is_same.sum(axis=1)
