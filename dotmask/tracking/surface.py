@@ -32,8 +32,6 @@ _CORNER_QUALITY, _CORNER_DISTANCE_PX, _HARRIS_K = 0.001, 4, 0.04
 _SPREAD = 0.6
 """Corners keep this share of the distance that they would have if they were spread evenly: they are found on the arms
 as well as on the print of a shirt."""
-_REFILL_BELOW = 0.75
-"""New corners are looked for when fewer than this share of the wanted points is left."""
 _DEPTH_JUMP_M = 0.3
 """A point whose depth changes by more from one frame to the next has slipped off its object."""
 _DEPTH_STEP_M = 0.05
@@ -109,7 +107,12 @@ def follow(
             is_kept &= np.abs(p_camera[:, 2] - before.p_camera[:, 2]) < _DEPTH_JUMP_M
             pixels, past, owner, p_camera = pixels[is_kept], past[is_kept], owner[is_kept], p_camera[is_kept]
             past_pixels = past_pixels[is_kept]
-    fresh = [_corners(grey, region, pixels[owner == i], settings.points) for i, region in enumerate(regions)]
+    have = [pixels[owner == i] for i in range(len(regions))]
+    served = _served([len(points) for points in have], frame.index)
+    fresh = [
+        _corners(grey, region, points, settings.points) if i in served else points[:0]
+        for i, (region, points) in enumerate(zip(regions, have, strict=True))
+    ]
     fresh_owner = np.repeat(np.arange(len(fresh)), [len(corners) for corners in fresh])
     fresh_pixels = np.concatenate([np.zeros((0, 2), np.float32), *fresh])
     fresh_camera = _lift(fresh_pixels, frame.depth_m, frame.intrinsics)
@@ -261,12 +264,21 @@ def _owners(pixels: npt.NDArray[np.float32], regions: Sequence[_Region]) -> npt.
     return owner
 
 
+def _served(counts: Sequence[int], frame_index: int) -> set[int]:
+    """Which objects get new corners in this frame: those that have no points, and the others by turns.
+
+    Corners take time to find, and an object loses few points from one frame to the next.
+    """
+    turn = {frame_index % len(counts)} if counts else set()
+    return turn | {i for i, count in enumerate(counts) if count == 0}
+
+
 def _corners(grey: GreyImage, region: _Region, have: npt.NDArray[np.float32], wanted: int) -> npt.NDArray[np.float32]:
     """(M, 2) new corners in a region, away from the points that it has."""
     height, width = region.inside.shape
-    if len(have) >= _REFILL_BELOW * wanted or not region.inside.any():
-        return np.zeros((0, 2), np.float32)
     area = cv2.countNonZero(region.inside)
+    if area == 0 or len(have) >= wanted:
+        return np.zeros((0, 2), np.float32)
     distance_px = max(_CORNER_DISTANCE_PX, int(_SPREAD * np.sqrt(area / wanted)))
     free = region.inside
     if len(have):
