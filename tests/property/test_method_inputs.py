@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from dotmask.pipeline import DotMask, FrontEndResult
-from dotmask.profiles import CALIBRATED, PAPER, Profile
+from dotmask.profiles import CALIBRATED, PAPER, MaskGrowth, Profile
 from dotmask.records import Detections, Intrinsics, RgbdFrame
 
 CAMERA = Intrinsics(width=64, height=48, fx=50.0, fy=50.0, cx=31.5, cy=23.5)
@@ -96,8 +96,8 @@ def assert_same(one: FrontEndResult, other: FrontEndResult) -> None:
 def assert_same_tracks(one: FrontEndResult, other: FrontEndResult) -> None:
     assert len(one.tracks) == len(other.tracks)
     for a, b in zip(one.tracks, other.tracks, strict=True):
-        assert (a.track_id, a.age_frames, a.misses, a.detection_index, a.verdict) == (
-            (b.track_id, b.age_frames, b.misses, b.detection_index, b.verdict)
+        assert (a.track_id, a.hits, a.phase, a.misses, a.detection_index, a.verdict) == (
+            (b.track_id, b.hits, b.phase, b.misses, b.detection_index, b.verdict)
         )
         np.testing.assert_array_equal(a.mean, b.mean)
         np.testing.assert_array_equal(a.covariance, b.covariance)
@@ -224,7 +224,7 @@ def test_a_box_that_reaches_out_of_the_image_is_measured_by_what_is_inside(
     result = Walk(profile).step(replace(NEXT, masks=inside[None], boxes_px=box, depth_m=depth))
     (observation,) = result.observations
     assert observation.position_camera[2] == pytest.approx(OBJECT_M)
-    assert observation.is_partial == profile.noise.inflates_hidden_sides
+    assert observation.is_partial == profile.noise.notices_hidden_sides
     assert (result.masked.mdi_m[inside] == 0).all()
 
 
@@ -268,7 +268,7 @@ def test_whatever_is_seen_states_stay_finite_and_every_removed_pixel_lies_under_
 ) -> None:
     boxes = np.array([[min(a, c), min(b, d), max(a, c), max(b, d)] for a, b, c, d in corners], float)
     masks = np.array([rectangle(*(int(x) for x in box)) for box in boxes])
-    walk = Walk(replace(profile, dilation_px=0, coasting_mask_frames=0))
+    walk = Walk(replace(profile, growth=MaskGrowth(base_px=0.0), coasting_mask_frames=0))
     for k, depth_m in enumerate(depths):
         count = len(boxes)
         class_names = tuple(data.draw(st.sampled_from(["person", "chair"])) for _ in range(count))
