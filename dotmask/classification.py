@@ -44,14 +44,16 @@ def classify(track: Track, previous: Track | None, profile: Profile) -> Verdict:
     moving_share = model.still_moving_share if was_moving else model.moving_share
     is_fast = speed > model.speed_threshold_m_s
     reason, speaks_for_rest = Reason.IDLE, True
-    if surface is not None and model.is_non_rigid:
-        # A hand may move before the body does, without a change of the mask.
-        reason = Reason.SURFACE if surface.moving_share >= moving_share else Reason.IDLE
-    elif surface is not None and surface.moving_share < moving_share:
-        reason = Reason.IDLE
-    elif surface is None and track.is_partial and profile.surface is not None:
-        # The centre of the visible part slides over the object: its speed says nothing.
-        speaks_for_rest = False
+    if surface is not None:
+        is_shifted = surface.moving_share >= moving_share
+        is_surface_fast = float(np.linalg.norm(surface.velocity_world)) > model.speed_threshold_m_s
+        if model.is_non_rigid and is_shifted:
+            reason = Reason.SURFACE  # a hand may move before the body does, without a change of the mask
+        elif is_fast and (is_shifted or is_surface_fast) and _is_significant(track, profile.speed_confidence):
+            reason = Reason.SPEED
+    elif track.is_partial and profile.surface is not None:
+        # The centre of the visible part slides over the object: its speed proves nothing.
+        speaks_for_rest = not (is_fast or model.is_non_rigid)
     elif is_fast and _is_significant(track, profile.speed_confidence):
         reason = Reason.SPEED
     else:
@@ -64,7 +66,8 @@ def classify(track: Track, previous: Track | None, profile: Profile) -> Verdict:
         return Verdict(is_moving=True, reason=reason, speed_m_s=speed, mask_iou=iou, calm_frames=0)
 
     calm = (before.calm_frames if before is not None else 0) + speaks_for_rest
-    if calm >= profile.calm_frames or (before is not None and before.reason is Reason.IDLE):
+    needed = profile.calm_frames if was_moving else profile.proof_frames
+    if calm >= needed or (before is not None and before.reason is Reason.IDLE):
         return Verdict(is_moving=False, reason=Reason.IDLE, speed_m_s=speed, mask_iou=iou, calm_frames=calm)
     if before is None or before.reason is Reason.NEW:
         is_masked = profile.unknown_policy == "mask"

@@ -301,7 +301,7 @@ def _initiate(observation: Observation, timestamp_s: float, T_world_camera: Floa
         mask=observation.mask,
         mask_timestamp_s=timestamp_s,
         mask_position_camera=observation.position_camera,
-        partial_timestamp_s=timestamp_s,
+        is_partial=False,
     )
     return _Target(track=track, updated_mean=mean, centroid_camera=observation.position_camera, mask_index=index)
 

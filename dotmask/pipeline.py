@@ -36,7 +36,7 @@ from dotmask.segmentation.selection import select_detections
 from dotmask.tracking.association import Associate, associate
 from dotmask.tracking.measurement import observe
 from dotmask.tracking.surface import SurfacePoints, follow, surface_motions
-from dotmask.tracking.tracker import TrackerState, track_objects
+from dotmask.tracking.tracker import PredictedTracks, TrackerState, predict_tracks, update_tracks
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -132,6 +132,7 @@ class _Kept:
     """State before the last frame and what that frame brought: enough to redo its tracking."""
 
     before: TrackerState
+    predicted: PredictedTracks
     frame: RgbdFrame
     points: SurfacePoints | None
     T_world_camera: FloatArray
@@ -183,8 +184,9 @@ class DotMask:
             detections.check_size(frame.intrinsics)
         with clock("track"):
             observations = observe(detections, frame, self._profile)
-            points = self._follow(frame, detections)
-            after = self._track(before, frame, detections, observations, points, T_world_camera)
+            points = self._follow(frame, detections, T_world_camera)
+            predicted = predict_tracks(before, frame.timestamp_s, self._profile)
+            after = self._update(predicted, frame, detections, observations, points, T_world_camera)
         with clock("classify"):
             after = self._classify(before, after)
         with clock("mask"):
@@ -204,7 +206,7 @@ class DotMask:
             masked=masked,
             stage_seconds=clock.seconds,
         )
-        self._state, self._kept = after, _Kept(before, frame, points, T_world_camera, result)
+        self._state, self._kept = after, _Kept(before, predicted, frame, points, T_world_camera, result)
         return result
 
     def refine(self, T_world_camera: FloatArray) -> FrontEndResult:
@@ -216,14 +218,16 @@ class DotMask:
         if self._kept is None:
             raise ValueError("refine: no frame has been processed yet")
         T_world_camera = checked_pose(T_world_camera, "T_world_camera")
-        before, frame, points, result = self._kept.before, self._kept.frame, self._kept.points, self._kept.result
+        kept, result = self._kept, self._kept.result
         assert result.detections is not None
         clock = StageClock()
         clock.seconds.update(result.stage_seconds)
         with clock("track"):
-            after = self._track(before, frame, result.detections, result.observations, points, T_world_camera)
+            after = self._update(
+                kept.predicted, kept.frame, result.detections, result.observations, kept.points, T_world_camera
+            )
         with clock("classify"):
-            after = self._classify(before, after)
+            after = self._classify(kept.before, after)
         self._state, self._kept.T_world_camera = after, T_world_camera
         return replace(result, tracks=after.tracks, stage_seconds=clock.seconds)
 
@@ -234,17 +238,17 @@ class DotMask:
         elapsed_s = frame.timestamp_s - self._kept.frame.timestamp_s
         return np.asarray((T_world_camera[:3, 3] - self._kept.T_world_camera[:3, 3]) / elapsed_s)
 
-    def _follow(self, frame: RgbdFrame, detections: Detections) -> SurfacePoints | None:
+    def _follow(self, frame: RgbdFrame, detections: Detections, T_world_camera: FloatArray) -> SurfacePoints | None:
         settings, kept = self._profile.surface, self._kept
         if settings is None:
             return None
         # The pose of the frame before is known by now as well as it will ever be.
         before, T_world_camera_before = (None, None) if kept is None else (kept.points, kept.T_world_camera)
-        return follow(before, frame, detections, T_world_camera_before, settings)
+        return follow(before, frame, detections, T_world_camera_before, T_world_camera, settings)
 
-    def _track(
+    def _update(
         self,
-        before: TrackerState,
+        predicted: PredictedTracks,
         frame: RgbdFrame,
         detections: Detections,
         observations: tuple[Observation, ...],
@@ -256,15 +260,8 @@ class DotMask:
         if points is not None and profile.surface is not None:
             models = [profile.class_model(name) for name in detections.class_names]
             surfaces = surface_motions(points, models, T_world_camera, frame.intrinsics, profile.noise, profile.surface)
-        return track_objects(
-            before,
-            observations,
-            surfaces,
-            frame.timestamp_s,
-            T_world_camera,
-            frame.intrinsics,
-            profile,
-            self._associate,
+        return update_tracks(
+            predicted, observations, surfaces, T_world_camera, frame.intrinsics, profile, self._associate
         )
 
     def _classify(self, before: TrackerState, after: TrackerState) -> TrackerState:

@@ -111,7 +111,8 @@ class SurfaceSettings:
         least_points: fewer say nothing.
         memory_frames: for how many frames a point's positions are kept.
         velocity_s: a point's velocity is taken over at most this time.
-        flow_sigma_px: of a point's place in the image after `memory_frames`.
+        flow_sigma_px: of a point's place in the image, pixels.
+        flow_sigma_share: grows by this times the way that it has gone in the image.
         flow_sigmas: a point moves if it left its place by more than so many of them.
     """
 
@@ -120,6 +121,7 @@ class SurfaceSettings:
     memory_frames: int = 6
     velocity_s: float = 0.11
     flow_sigma_px: float = 0.5
+    flow_sigma_share: float = 0.02
     flow_sigmas: float = 3.0
 
 
@@ -178,7 +180,8 @@ class Profile:
             value and prints "above": misprint (e).
         aligns_masks: whether masks are laid over each other with their boxes before the IoU, so that neither the
             camera's motion nor a change of distance counts (calibrated), or as they are (paper).
-        calm_frames: consecutive frames of idle evidence until a new or moving object is idle; 1 = no hysteresis.
+        proof_frames: frames that speak for rest until a new object is idle.
+        calm_frames: consecutive frames that speak for rest until a moving object is idle; 1 = no hysteresis.
         unknown_policy: what a track is in its first frames, before it is known to be idle: masked or kept.
         growth: of masks before they are cut out.
         coasting_mask_frames: for how many frames an unseen moving track is still cut out, where it is predicted.
@@ -202,6 +205,7 @@ class Profile:
     speed_confidence: float
     deformation_iou: float
     aligns_masks: bool
+    proof_frames: int
     calm_frames: int
     unknown_policy: UnknownPolicy
     growth: MaskGrowth
@@ -210,7 +214,14 @@ class Profile:
 
     def __post_init__(self) -> None:
         """Refuse values outside their range."""
-        for name in ("max_observations", "max_misses", "confirming_hits", "min_depth_pixels", "calm_frames"):
+        for name in (
+            "max_observations",
+            "max_misses",
+            "confirming_hits",
+            "min_depth_pixels",
+            "proof_frames",
+            "calm_frames",
+        ):
             if getattr(self, name) < 1:
                 raise ValueError(f"profile {self.name}: {name} must be at least 1")
         if not (0 < self.gate_probability < 1 and 0 <= self.speed_confidence < 1):
@@ -265,6 +276,7 @@ PAPER = Profile(
     speed_confidence=0.0,
     deformation_iou=0.9,
     aligns_masks=False,
+    proof_frames=1,
     calm_frames=1,
     unknown_policy="keep",
     growth=MaskGrowth(base_px=1.0),
@@ -310,7 +322,7 @@ CALIBRATED = Profile(
             slide_sigma_m=0.2,
             surface_sigma_m_s=0.15,
             moving_share=0.1,
-            still_moving_share=0.02,
+            still_moving_share=0.05,
         ),
         _calibrated_thing("chair", shape_sigma_m=0.012, slide_sigma_m=0.2),
         _calibrated_thing("cup", shape_sigma_m=0.005, slide_sigma_m=0.05),
@@ -318,7 +330,7 @@ CALIBRATED = Profile(
     ),
     score_threshold=0.3,
     max_observations=10,
-    max_misses=30,
+    max_misses=90,
     confirming_hits=3,
     measurement="bbox_centre",
     noise=MeasurementNoise(
@@ -343,7 +355,8 @@ CALIBRATED = Profile(
     speed_confidence=0.99,
     deformation_iou=0.9,
     aligns_masks=True,
-    calm_frames=3,
+    proof_frames=2,
+    calm_frames=5,
     unknown_policy="mask",
     growth=MaskGrowth(base_px=3.0, margin_m=0.005, depth_delay_s=0.005),
     coasting_mask_frames=10,

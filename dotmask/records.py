@@ -328,7 +328,7 @@ class Track:
         mask: (H, W) bool, the last mask seen.
         mask_timestamp_s: when it was seen.
         mask_position_camera: (3,) where the track was then in the camera frame, metres.
-        partial_timestamp_s: when something last hid a part of it, or when it was first seen.
+        is_partial: whether something hid a part of it when it was last seen.
         innovation: of this frame's update; None at birth and when not seen.
         surface: how its surface moved; None when not seen, or with too few points.
         verdict: moving or idle; None until the classification has run.
@@ -346,7 +346,7 @@ class Track:
     mask: MaskImage
     mask_timestamp_s: float
     mask_position_camera: FloatArray
-    partial_timestamp_s: float
+    is_partial: bool
     innovation: Innovation | None = None
     surface: SurfaceMotion | None = None
     verdict: Verdict | None = None
@@ -358,11 +358,6 @@ class Track:
             check_finite(array, name)
             object.__setattr__(self, name, array)
         object.__setattr__(self, "mask", checked(self.mask, "mask", (None, None), np.bool_))
-
-    @property
-    def is_partial(self) -> bool:
-        """Whether something hid a part of it when it was last seen."""
-        return self.partial_timestamp_s == self.mask_timestamp_s
 
     @property
     def position_world(self) -> FloatArray:

@@ -50,11 +50,11 @@ def squared_mahalanobis(
     R_camera_world = T_camera_world[:3, :3]
     expected = transform(T_camera_world, np.array([t.position_world for t in tracks]))
     P = R_camera_world @ np.array([t.covariance[:3, :3] for t in tracks]) @ R_camera_world.T
-    model = observations[0].model  # one frame's observations are made alike
-    J = model.jacobian(expected)
-    z = model.measured(np.array([o.position_camera for o in observations]))
-    y = z[None] - model.measured(expected)[:, None]
-    S = (J @ P @ J.swapaxes(1, 2))[:, None] + np.array([o.covariance for o in observations])[None]
+    # What is measured is taken as linear around the observations, which lie in the image, as predictions may not.
+    seen = np.array([o.position_camera for o in observations])
+    J = observations[0].model.jacobian(seen)[None]  # one frame's observations are made alike
+    y = (J @ (seen[None] - expected[:, None])[..., None])[..., 0]
+    S = J @ P[:, None] @ J.swapaxes(-1, -2) + np.array([o.covariance for o in observations])[None]
     return np.asarray((y * np.linalg.solve(S, y[..., None])[..., 0]).sum(-1))
 
 

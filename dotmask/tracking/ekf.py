@@ -55,15 +55,27 @@ def initiate(
         mask=observation.mask,
         mask_timestamp_s=timestamp_s,
         mask_position_camera=observation.position_camera,
-        partial_timestamp_s=timestamp_s,
+        is_partial=observation.is_partial,
     )
 
 
-def innovate(track: Track, observation: Observation, T_world_camera: FloatArray) -> Innovation:
-    """`y = z - h(x)` and `S = H P Hᵀ + R`, in the units of what is measured."""
+def innovate(track: Track, observation: Observation, T_world_camera: FloatArray) -> tuple[Innovation, FloatArray]:
+    """`y = z - h(x)` and `S = H P Hᵀ + R`, in the units of what is measured, and H (3, 6).
+
+    h is taken as linear around the prediction; where that is so far off (behind the camera, or at less than half or
+    more than twice the measured depth) that it is not, around the observation.
+    """
+    model, p_seen = observation.model, observation.position_camera
     p_camera = transform(inverse(T_world_camera), track.position_world)
-    H = measurement_jacobian(p_camera, observation.model, T_world_camera)
-    return _innovation(track, observation, p_camera, H)
+    p_linear = p_camera if 0.5 * p_seen[2] < p_camera[2] < 2.0 * p_seen[2] else p_seen
+    H = measurement_jacobian(p_linear, model, T_world_camera)
+    expected = model.measured(p_linear)
+    if p_linear is p_seen:
+        expected = expected + model.jacobian(p_seen) @ (p_camera - p_seen)
+    innovation = Innovation(
+        residual=model.measured(p_seen) - expected, covariance=H @ track.covariance @ H.T + observation.covariance
+    )
+    return innovation, H
 
 
 def update(
@@ -85,10 +97,7 @@ def update(
         T_world_camera: (4, 4) camera pose at the frame.
         profile: says when a track is confirmed.
     """
-    T_camera_world = inverse(T_world_camera)
-    p_camera = transform(T_camera_world, track.position_world)
-    H = measurement_jacobian(p_camera, observation.model, T_world_camera)
-    innovation = _innovation(track, observation, p_camera, H)
+    innovation, H = innovate(track, observation, T_world_camera)
     mean, P = _corrected(track.mean, track.covariance, innovation, H, observation.covariance)
     if surface is not None:
         residual, S = surface.velocity_world - mean[3:], P[3:, 3:] + surface.covariance
@@ -107,8 +116,8 @@ def update(
         detection_index=observation.detection_index,
         mask=observation.mask,
         mask_timestamp_s=track.timestamp_s,
-        mask_position_camera=transform(T_camera_world, mean[:3]),
-        partial_timestamp_s=track.timestamp_s if observation.is_partial else track.partial_timestamp_s,
+        mask_position_camera=transform(inverse(T_world_camera), mean[:3]),
+        is_partial=observation.is_partial,
         innovation=innovation,
         surface=surface,
     )
@@ -119,14 +128,6 @@ def slide(track: Track, variance_m2: float) -> Track:
     P = track.covariance.copy()
     P[:3, :3] += variance_m2 * np.eye(3)
     return replace(track, covariance=P)
-
-
-def _innovation(track: Track, observation: Observation, p_camera: FloatArray, H: FloatArray) -> Innovation:
-    model = observation.model
-    return Innovation(
-        residual=model.measured(observation.position_camera) - model.measured(p_camera),
-        covariance=H @ track.covariance @ H.T + observation.covariance,
-    )
 
 
 def _corrected(

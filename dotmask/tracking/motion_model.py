@@ -27,11 +27,12 @@ def process_noise(dt_s: float, acceleration_sigmas_m_s2: FloatArray) -> FloatArr
         dt_s: duration of the frame.
         acceleration_sigmas_m_s2: (3,) roots of Σ's diagonal, world axes; the components are uncorrelated (paper).
     """
-    gamma = np.zeros((6, 3))
-    gamma[_ROWS, _ROWS] = 0.5 * dt_s * dt_s
-    gamma[_COLUMNS, _ROWS] = dt_s
-    scaled = gamma * acceleration_sigmas_m_s2
-    return np.asarray(scaled @ scaled.T)
+    variances = acceleration_sigmas_m_s2**2
+    Q = np.zeros((6, 6))
+    Q[_ROWS, _ROWS] = 0.25 * dt_s**4 * variances
+    Q[_ROWS, _COLUMNS] = Q[_COLUMNS, _ROWS] = 0.5 * dt_s**3 * variances
+    Q[_COLUMNS, _COLUMNS] = dt_s**2 * variances
+    return Q
 
 
 def predict(track: Track, timestamp_s: float, profile: Profile) -> Track:
@@ -52,7 +53,7 @@ def predict(track: Track, timestamp_s: float, profile: Profile) -> Track:
     P = F @ track.covariance @ F.T + process_noise(dt_s, model.acceleration_sigma_m_s2 * model.axis_shares)
     P = 0.5 * (P + P.T)
     if track.is_partial:
-        P[_ROWS, _ROWS] += slide_variance(track, timestamp_s, profile)
+        P[_ROWS, _ROWS] += slide_variance(track.class_name, dt_s, profile)
     return replace(
         track,
         timestamp_s=timestamp_s,
@@ -66,10 +67,9 @@ def predict(track: Track, timestamp_s: float, profile: Profile) -> Track:
     )
 
 
-def slide_variance(track: Track, timestamp_s: float, profile: Profile) -> float:
-    """How far, squared, the measured point of a half hidden object may slide over it until `timestamp_s`, per axis.
+def slide_variance(class_name: str, dt_s: float, profile: Profile) -> float:
+    """How far, squared, the measured point of a half hidden object may slide over it in `dt_s` seconds, per axis.
 
     What is measured is the centre of the visible part, and more or less of the object shows from frame to frame.
     """
-    sigma_m = profile.class_model(track.class_name).slide_sigma_m
-    return sigma_m**2 * (timestamp_s - track.timestamp_s)
+    return profile.class_model(class_name).slide_sigma_m ** 2 * dt_s

@@ -27,11 +27,12 @@ _MOST_DIFFERENCE = 8.0
 """Mean difference in grey levels between the surroundings of a point then and now; more, and it was not found again."""
 _BORDER = np.ones((5, 5), np.uint8)
 """Points keep off a mask's border by two pixels of the half size image: there, the background moves with them."""
-_CORNER_QUALITY, _CORNER_DISTANCE_PX = 0.01, 4
+_CORNER_QUALITY, _CORNER_DISTANCE_PX, _HARRIS_K = 0.001, 4, 0.04
+"""By the measure of Harris and Stephens (1988), which refuses edges: a point would slide along a stripe."""
 _SPREAD = 0.6
 """Corners keep this share of the distance that they would have if they were spread evenly: they are found on the arms
 as well as on the print of a shirt."""
-_REFILL_BELOW = 0.85
+_REFILL_BELOW = 0.75
 """New corners are looked for when fewer than this share of the wanted points is left."""
 _DEPTH_JUMP_M = 0.3
 """A point whose depth changes by more from one frame to the next has slipped off its object."""
@@ -54,6 +55,7 @@ class SurfacePoints:
         detection_index: (N,) whose mask each lies in.
         past_world: (N, K, 3) positions in the world in the frames before, the latest first, metres; NaN where a point
             was not followed yet.
+        past_pixels: (N, K, 2) where they were then in the half size image.
         past_s: (K,) stamps of those frames; NaN before the first.
     """
 
@@ -63,6 +65,7 @@ class SurfacePoints:
     p_camera: FloatArray
     detection_index: npt.NDArray[np.intp]
     past_world: FloatArray
+    past_pixels: npt.NDArray[np.float32]
     past_s: FloatArray
 
 
@@ -71,6 +74,7 @@ def follow(
     frame: RgbdFrame,
     detections: Detections,
     T_world_camera_before: FloatArray | None,
+    T_world_camera: FloatArray,
     settings: SurfaceSettings,
 ) -> SurfacePoints:
     """The points of the frame before that are still seen on an object, and new ones where there are too few.
@@ -80,12 +84,15 @@ def follow(
         frame: the next one.
         detections: of `frame`.
         T_world_camera_before: (4, 4) pose of the frame before, as odometry found it; None at the start.
+        T_world_camera: (4, 4) pose of `frame` as predicted: the search begins where a point would be at rest, so that
+            it finds points of a turning camera.
         settings: parameters.
     """
     grey = _half_size(frame.rgb)
     regions = [_inner_region(box, mask) for box, mask in zip(detections.boxes_px, detections.masks, strict=True)]
     pixels = np.zeros((0, 2), np.float32)
     past = np.zeros((0, settings.memory_frames, 3))
+    past_pixels = np.zeros((0, settings.memory_frames, 2), np.float32)
     past_s = np.full(settings.memory_frames, np.nan)
     owner, p_camera = np.zeros(0, np.intp), np.zeros((0, 3))
     if before is not None and T_world_camera_before is not None:
@@ -93,12 +100,15 @@ def follow(
         if len(before.pixels):
             world = transform(T_world_camera_before, before.p_camera)
             past = np.concatenate([world[:, None], before.past_world[:, :-1]], axis=1)
-            pixels, found = _flow(before, grey)
+            past_pixels = np.concatenate([before.pixels[:, None], before.past_pixels[:, :-1]], axis=1)
+            expected = project(transform(inverse(T_world_camera), world), frame.intrinsics)
+            pixels, found = _flow(before, grey, _half_pixels(expected))
             owner = _owners(pixels, regions)
             p_camera = _lift(pixels, frame.depth_m, frame.intrinsics)
             is_kept = found & (owner >= 0) & (p_camera[:, 2] > 0)
             is_kept &= np.abs(p_camera[:, 2] - before.p_camera[:, 2]) < _DEPTH_JUMP_M
             pixels, past, owner, p_camera = pixels[is_kept], past[is_kept], owner[is_kept], p_camera[is_kept]
+            past_pixels = past_pixels[is_kept]
     fresh = [_corners(grey, region, pixels[owner == i], settings.points) for i, region in enumerate(regions)]
     fresh_owner = np.repeat(np.arange(len(fresh)), [len(corners) for corners in fresh])
     fresh_pixels = np.concatenate([np.zeros((0, 2), np.float32), *fresh])
@@ -111,6 +121,9 @@ def follow(
         p_camera=np.concatenate([p_camera, fresh_camera[has_depth]]),
         detection_index=np.concatenate([owner, fresh_owner[has_depth]]),
         past_world=np.concatenate([past, np.full((int(has_depth.sum()), *past.shape[1:]), np.nan)]),
+        past_pixels=np.concatenate(
+            [past_pixels, np.full((int(has_depth.sum()), *past_pixels.shape[1:]), np.nan, np.float32)]
+        ),
         past_s=past_s,
     )
 
@@ -126,7 +139,8 @@ def surface_motions(
     """How the surface of each detection moves in the world; None where too few points are known from before.
 
     A point counts as moving if it left the pixel that it would be seen at, had it stood still since it was first
-    followed, by more than the flow's noise, and faster than the class's threshold.
+    followed (or for half of that time), by more than the flow's noise, and faster than the class's threshold. What
+    comes straight at the camera hardly does: its velocity tells.
 
     Args:
         points: of this frame.
@@ -145,14 +159,16 @@ def surface_motions(
     owner, rows = points.detection_index[known], np.arange(len(known))
     elapsed_s = points.timestamp_s - points.past_s
 
-    seen_px = _SCALE * points.pixels[known] + 0.5 * (_SCALE - 1)
+    seen_px, past_px = _full_pixels(points.pixels[known]), _full_pixels(points.past_pixels[known])
     thresholds = np.array([model.speed_threshold_m_s for model in models])[owner]
     is_moving = np.zeros(len(known), np.bool_)
     for ago in (age - 1, (age - 1) // 2):
         expected_px = project(transform(inverse(T_world_camera), past[rows, ago]), intrinsics)
         left_px = np.linalg.norm(seen_px - expected_px, axis=1)
         speeds = left_px * p_camera[:, 2] / intrinsics.fx / elapsed_s[ago]
-        is_moving |= ~(left_px <= settings.flow_sigmas * settings.flow_sigma_px) & (speeds > thresholds)
+        way_px = np.linalg.norm(seen_px - past_px[rows, ago], axis=1)
+        sigma_px = settings.flow_sigma_px + settings.flow_sigma_share * way_px
+        is_moving |= ~(left_px <= settings.flow_sigmas * sigma_px) & (speeds > thresholds)
 
     lag = np.minimum(age, max(1, int(np.count_nonzero(elapsed_s <= settings.velocity_s)))) - 1
     T = T_world_camera
@@ -192,16 +208,29 @@ def _half_size(rgb: ColourImage) -> GreyImage:
     return np.asarray(cv2.resize(cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY), size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
-def _flow(before: SurfacePoints, grey: GreyImage) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.bool_]]:
-    """Where the points are in `grey` (N, 2), and whether each was found (N,)."""
+def _full_pixels(half: npt.NDArray[np.float32]) -> FloatArray:
+    """(..., 2) pixels of the image of pixels (..., 2) of the one at half its size."""
+    return np.asarray(_SCALE * half.astype(np.float64) + 0.5 * (_SCALE - 1))
+
+
+def _half_pixels(full: FloatArray) -> npt.NDArray[np.float32]:
+    """The inverse of `_full_pixels`."""
+    return ((full - 0.5 * (_SCALE - 1)) / _SCALE).astype(np.float32)
+
+
+def _flow(
+    before: SurfacePoints, grey: GreyImage, expected: npt.NDArray[np.float32]
+) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.bool_]]:
+    """Where the points are in `grey` (N, 2), searched from `expected` on, and whether each was found (N,)."""
     pixels, found, difference = cv2.calcOpticalFlowPyrLK(
         before.grey,
         grey,
         before.pixels,
-        np.zeros_like(before.pixels),
+        np.where(np.isfinite(expected), expected, before.pixels),
         winSize=(_WINDOW_PX, _WINDOW_PX),
         maxLevel=_LEVELS,
         criteria=_FLOW_STOP,
+        flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
     )
     is_alike = np.asarray(difference)[:, 0] <= _MOST_DIFFERENCE
     return np.asarray(pixels, np.float32), (np.asarray(found)[:, 0] == 1) & is_alike
@@ -245,7 +274,9 @@ def _corners(grey: GreyImage, region: _Region, have: npt.NDArray[np.float32], wa
         for u, v in np.rint(have).astype(int) - (region.left, region.top):
             cv2.circle(free, (int(u), int(v)), distance_px, 0, -1)
     patch = np.ascontiguousarray(grey[region.top : region.top + height, region.left : region.left + width])
-    found = cv2.goodFeaturesToTrack(patch, wanted - len(have), _CORNER_QUALITY, distance_px, mask=free)
+    found = cv2.goodFeaturesToTrack(
+        patch, wanted - len(have), _CORNER_QUALITY, distance_px, mask=free, useHarrisDetector=True, k=_HARRIS_K
+    )
     if found is None:
         return np.zeros((0, 2), np.float32)
     return np.asarray(found[:, 0] + np.array([region.left, region.top], np.float32), np.float32)
@@ -256,11 +287,12 @@ def _lift(pixels: npt.NDArray[np.float32], depth_m: DepthImage, intrinsics: Intr
 
     The depth is the mean of the 3x3 neighbours on the same surface.
     """
-    full = _SCALE * pixels.astype(np.float64) + 0.5 * (_SCALE - 1)
+    full = _full_pixels(pixels)
     height, width = depth_m.shape
     u = np.clip(np.rint(full[:, 0]).astype(np.intp), 1, width - 2)
     v = np.clip(np.rint(full[:, 1]).astype(np.intp), 1, height - 2)
-    around = np.stack([depth_m[v + dv, u + du] for dv in (-1, 0, 1) for du in (-1, 0, 1)], axis=1).astype(np.float64)
+    neighbours = (np.arange(-1, 2)[:, None] * width + np.arange(-1, 2)).ravel()
+    around = depth_m.ravel()[(v * width + u)[:, None] + neighbours].astype(np.float64)
     centre = around[:, 4]
     is_same = (around > 0) & (np.abs(around - centre[:, None]) < _DEPTH_STEP_M)
     count = is_same.sum(axis=1)

@@ -23,41 +23,67 @@ class TrackerState:
     next_track_id: int = 1
 
 
-def track_objects(
-    state: TrackerState,
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PredictedTracks:
+    """The tracks as they are expected in a frame, before it is looked at.
+
+    Attributes:
+        tracks: by ascending id, each with one more miss.
+        timestamp_s: of the frame.
+        elapsed_s: since the frame before; 0 without tracks.
+        next_track_id: see TrackerState.
+    """
+
+    tracks: tuple[Track, ...]
+    timestamp_s: float
+    elapsed_s: float
+    next_track_id: int
+
+
+def predict_tracks(state: TrackerState, timestamp_s: float, profile: Profile) -> PredictedTracks:
+    """What is expected in the frame at `timestamp_s`; `state` itself stays as it is.
+
+    Raises:
+        ValueError: the frame is not later than the state.
+    """
+    return PredictedTracks(
+        tracks=tuple(predict(track, timestamp_s, profile) for track in state.tracks),
+        timestamp_s=timestamp_s,
+        elapsed_s=timestamp_s - state.tracks[0].timestamp_s if state.tracks else 0.0,
+        next_track_id=state.next_track_id,
+    )
+
+
+def update_tracks(
+    predicted: PredictedTracks,
     observations: Sequence[Observation],
     surfaces: Sequence[SurfaceMotion | None],
-    timestamp_s: float,
     T_world_camera: FloatArray,
     intrinsics: Intrinsics,
     profile: Profile,
     associate: Associate = associate,
 ) -> TrackerState:
-    """The state after one frame; `state` itself stays as it is.
+    """The state after a frame.
 
     Tracks without an observation keep their prediction and go on moving; after `profile.max_misses` such frames they
     end, tentative ones at once. Tracks and observations that the gate left over are paired again as if the object had
     come out from behind something. Observations without a track start one, in the order of the observations.
 
     Args:
-        state: after the frame before.
+        predicted: for this frame.
         observations: of this frame, from `dotmask.tracking.measurement.observe`.
         surfaces: for each detection how its surface moves, from `dotmask.tracking.surface.surface_motions`.
-        timestamp_s: of this frame.
         T_world_camera: (4, 4) camera pose at this frame.
         intrinsics: of the camera.
         profile: parameters.
         associate: pairs tracks and observations.
-
-    Raises:
-        ValueError: the frame is not later than the state.
     """
-    tracks = [predict(track, timestamp_s, profile) for track in state.tracks]
+    tracks = list(predicted.tracks)
     association = associate(tracks, observations, T_world_camera, intrinsics, profile)
     for i, j in association.pairs:
         track, observation = tracks[i], observations[j]
         if observation.is_partial and not track.is_partial:
-            track = slide(track, slide_variance(state.tracks[i], timestamp_s, profile))
+            track = slide(track, slide_variance(track.class_name, predicted.elapsed_s, profile))
         tracks[i] = update(track, observation, surfaces[observation.detection_index], T_world_camera, profile)
 
     newcomers = [observations[j] for j in association.unmatched_observations]
@@ -71,11 +97,11 @@ def track_objects(
         newcomers = [newcomers[j] for j in second.unmatched_observations]
 
     births = [
-        initiate(observation, timestamp_s, T_world_camera, profile, state.next_track_id + k)
+        initiate(observation, predicted.timestamp_s, T_world_camera, profile, predicted.next_track_id + k)
         for k, observation in enumerate(newcomers)
     ]
     living = [track for track in tracks if track.misses < _patience(track, profile)]
-    return TrackerState(tracks=(*living, *births), next_track_id=state.next_track_id + len(births))
+    return TrackerState(tracks=(*living, *births), next_track_id=predicted.next_track_id + len(births))
 
 
 def _patience(track: Track, profile: Profile) -> int:

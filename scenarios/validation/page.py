@@ -23,6 +23,8 @@ SECTIONS: tuple[Section, ...] = (
 FRAMES, QUICK_FRAMES = 450, 40
 """At most so many frames of each scenario."""
 
+QUICK_NOTE = "**Made with `--quick`: too few frames and seeds to learn anything from.**\n\n"
+
 
 def validate(
     out: Path, *, is_quick: bool, only: Sequence[str], show: Callable[[str], None], advance: Callable[[], None]
@@ -57,21 +59,20 @@ def validate(
         for section in SECTIONS:
             if not only or section.name in only:
                 show(section.title)
-                (out / f"{section.name}.md").write_text(section.write(context) + "\n", encoding="utf-8")
-        page.write_text(_page(out, is_quick), encoding="utf-8")
+                text = f"{QUICK_NOTE if is_quick else ''}{section.write(context)}\n"
+                (out / f"{section.name}.md").write_text(text, encoding="utf-8")
+        page.write_text(_page(out), encoding="utf-8")
     except OSError as error:
         raise ScenarioError(f"--out {out}: cannot be written ({error})") from error
     return page
 
 
-def _page(folder: Path, is_quick: bool) -> str:
+def _page(folder: Path) -> str:
     parts = [
         "# Validation",
         "Written by `dotmask validate`: every figure can be measured again. Segmenter: the oracle, unless a "
         "scenario says otherwise; sensor `kinect_v1`; seed 0.",
     ]
-    if is_quick:
-        parts.append("**Made with `--quick`: too few frames and seeds to learn anything from.**")
     for section in SECTIONS:
         piece = folder / f"{section.name}.md"
         if piece.exists():

@@ -196,6 +196,7 @@ def answers(
 def write(context: Context) -> str:
     """See Section."""
     contenders = all_profiles()
+    thresholds = ", ".join(f"{n} {c.profile.class_model('chair').speed_threshold_m_s:g}" for n, c in contenders.items())
     speeds = CHAIR_SPEEDS_M_S[2:5:2] if context.is_quick else CHAIR_SPEEDS_M_S
     walks = PERSON_SPEEDS_M_S[1:2] if context.is_quick else PERSON_SPEEDS_M_S
     cameras = CAMERA_SPEEDS_M_S[1:4:2] if context.is_quick else CAMERA_SPEEDS_M_S
@@ -229,7 +230,8 @@ def write(context: Context) -> str:
             f"{WAY_M:g} m), and stands again; a person stands, walks and stands. Sensor `kinect_v1`, "
             "closed loop with odometry, the camera goes from side to side at up to 0.2 m/s. Latencies in frames "
             "at 30 Hz, from the first frame above half of the nominal speed, and from the first frame after the "
-            "motion; - means that the answer never came.",
+            "motion; - means that the answer never came. "
+            f"The speed thresholds of a chair: {thresholds} m/s.",
             _latency_table("chair", chairs, list(contenders)),
             latencies,
             _latency_table("person", people, list(contenders)),

@@ -43,13 +43,16 @@ def test_one_section_is_made_again_and_the_others_stay(tmp_path, sections) -> No
     assert "text of second, run 3" in text
 
 
-def test_a_quick_page_says_so(tmp_path, sections) -> None:
-    assert "Made with `--quick`" in write(tmp_path / "page", quick=True).read_text()
+def test_a_quick_section_says_so(tmp_path, sections) -> None:
+    assert write(tmp_path / "page", quick=True).read_text().count("Made with `--quick`") == 2
+    text = write(tmp_path / "page", only=("second",)).read_text()
+    assert text.index("Made with `--quick`") < text.index("## SECOND")
+    assert text.count("Made with `--quick`") == 1
 
 
 def test_an_unknown_section_is_named(tmp_path) -> None:
     with pytest.raises(ScenarioError, match="consistency"):
-        write(tmp_path / "page", only=("consistancy",))
+        write(tmp_path / "page", only=("consist",))
     assert not (tmp_path / "page").exists()
 
 
