@@ -30,6 +30,7 @@ from dotmask.records import (
     RgbdFrame,
     SurfaceMotion,
     Track,
+    checked_pose,
 )
 from dotmask.segmentation.selection import select_detections
 from dotmask.tracking.association import Associate, associate
@@ -113,6 +114,7 @@ class MaskAll:
         clock = StageClock()
         with clock("segment"):
             detections = select_detections(self._segmenter.segment(frame), self._profile)
+            detections.check_size(frame.intrinsics)
         with clock("mask"):
             masked = mask_depth(frame.depth_m, all_cutouts(detections, self._profile))
         self._result = FrontEndResult(
@@ -167,10 +169,19 @@ class DotMask:
         Args:
             frame: the next frame; stamps must increase.
             T_world_camera: (4, 4) the camera pose as predicted before odometry has seen the frame.
+
+        Raises:
+            ValueError: the frame is not later than the one before, the pose is no rigid transform, or what the
+                segmenter found does not fit the frame.
         """
+        if self._kept is not None and not frame.timestamp_s > self._kept.frame.timestamp_s:
+            stamps = f"{frame.timestamp_s} s is not later than the one before at {self._kept.frame.timestamp_s} s"
+            raise ValueError(f"step: frame at {stamps}")
+        T_world_camera = checked_pose(T_world_camera, "T_world_camera")
         clock, before = StageClock(), self._state
         with clock("segment"):
             detections = select_detections(self._segmenter.segment(frame), self._profile)
+            detections.check_size(frame.intrinsics)
         with clock("track"):
             observations = observe(detections, frame, self._profile)
             points = self._follow(frame, detections, T_world_camera)
@@ -206,6 +217,7 @@ class DotMask:
         """
         if self._kept is None:
             raise ValueError("refine: no frame has been processed yet")
+        T_world_camera = checked_pose(T_world_camera, "T_world_camera")
         kept, result = self._kept, self._kept.result
         assert result.detections is not None
         clock = StageClock()

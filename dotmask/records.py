@@ -9,6 +9,7 @@ Arrays are kept as read-only views: no copy is made, and the caller's own array 
 
 from dataclasses import dataclass
 from enum import Enum
+from math import isfinite
 from typing import Any, Protocol
 
 import numpy as np
@@ -18,6 +19,9 @@ FloatArray = npt.NDArray[np.float64]
 DepthImage = npt.NDArray[np.float32]
 ColourImage = npt.NDArray[np.uint8]
 MaskImage = npt.NDArray[np.bool_]
+
+_ORTHONORMAL = 1e-6
+"""By how much the products of a rotation's rows may be off."""
 
 
 def checked(array: Any, name: str, shape: tuple[int | None, ...], dtype: type) -> npt.NDArray[Any]:
@@ -32,6 +36,18 @@ def checked(array: Any, name: str, shape: tuple[int | None, ...], dtype: type) -
     Raises:
         ValueError: the shape or the type is another one, or a float array is not finite.
     """
+    if type(array) is np.ndarray and array.shape == shape and array.dtype.type is dtype and array.dtype.isnative:
+        given: npt.NDArray[Any] = array
+        if not given.flags.writeable:
+            return given
+    else:
+        given = _converted(array, name, shape, dtype)
+    view = given.view()
+    view.flags.writeable = False
+    return view
+
+
+def _converted(array: Any, name: str, shape: tuple[int | None, ...], dtype: type) -> npt.NDArray[Any]:
     given = np.asarray(array)
     if given.dtype != np.dtype(dtype):
         if given.dtype.kind not in "iufb" or not np.can_cast(given.dtype, dtype, "safe"):
@@ -43,15 +59,34 @@ def checked(array: Any, name: str, shape: tuple[int | None, ...], dtype: type) -
     if not matches:
         wanted = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ")"
         raise ValueError(f"{name}: expected shape {wanted}, got {given.shape}")
-    view = given.view()
-    view.flags.writeable = False
-    return view
+    return given
 
 
 def check_finite(array: npt.NDArray[Any], name: str) -> None:
     """Raise ValueError unless every element of `array` is a finite number."""
-    if not np.isfinite(array).all():
+    # The sum of squares is finite only if all elements are; it may overflow where they are.
+    if not isfinite(np.vdot(array, array)) and not np.isfinite(array).all():
         raise ValueError(f"{name}: holds a number that is not finite")
+
+
+def checked_pose(T_a_b: Any, name: str) -> FloatArray:
+    """A read-only view of a rigid transform (4, 4).
+
+    Raises:
+        ValueError: the shape or the type is another one, a number is not finite, or it is not a rotation (to 1e-6) and
+            a translation over the row 0, 0, 0, 1.
+    """
+    T = checked(T_a_b, name, (4, 4), np.float64)
+    check_finite(T, name)
+    (a, b, c, _), (d, e, f, _), (g, h, i, _), bottom = T.tolist()
+    if bottom != [0.0, 0.0, 0.0, 1.0]:
+        raise ValueError(f"{name}: the last row must be 0, 0, 0, 1")
+    off_unit = max(abs(a * a + b * b + c * c - 1), abs(d * d + e * e + f * f - 1), abs(g * g + h * h + i * i - 1))
+    off_right = max(abs(a * d + b * e + c * f), abs(a * g + b * h + c * i), abs(d * g + e * h + f * i))
+    determinant = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
+    if off_unit > _ORTHONORMAL or off_right > _ORTHONORMAL or determinant < 0:
+        raise ValueError(f"{name}: the upper left 3x3 block is no rotation")
+    return T
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,7 +121,8 @@ class RgbdFrame:
         index: number of the frame, from 0.
         timestamp_s: time stamp of both images, seconds.
         rgb: (H, W, 3) uint8.
-        depth_m: (H, W) float32, z in metres, 0 = no return.
+        depth_m: (H, W) float32, z in metres, 0 = no return. What says NaN where there is none (ROS: 32FC1) is
+            converted before.
         intrinsics: of both images (depth is registered to colour).
     """
 
@@ -97,12 +133,17 @@ class RgbdFrame:
     intrinsics: Intrinsics
 
     def __post_init__(self) -> None:
-        """Check both images against the intrinsics."""
+        """Check both images against the intrinsics, and that every depth is a number of metres."""
         size = (self.intrinsics.height, self.intrinsics.width)
         object.__setattr__(self, "rgb", checked(self.rgb, "rgb", (*size, 3), np.uint8))
         object.__setattr__(self, "depth_m", checked(self.depth_m, "depth_m", size, np.float32))
-        if not np.isfinite(self.timestamp_s):
+        if not isfinite(self.timestamp_s):
             raise ValueError("timestamp_s: not finite")
+        if not (self.depth_m.min() >= 0 and self.depth_m.max() < np.inf):
+            raise ValueError(
+                "depth_m: holds NaN, infinite or negative values; 0 means no return: "
+                "use np.where((depth_m > 0) & (depth_m < np.inf), depth_m, 0)"
+            )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -122,17 +163,28 @@ class Detections:
     scores: FloatArray
 
     def __post_init__(self) -> None:
-        """Check that all columns speak of the same number of instances."""
+        """Check that all columns speak of the same number of instances, and hold boxes and scores."""
         count = len(self.class_names)
         object.__setattr__(self, "masks", checked(self.masks, "masks", (count, None, None), np.bool_))
         object.__setattr__(self, "boxes_px", checked(self.boxes_px, "boxes_px", (count, 4), np.float64))
         object.__setattr__(self, "scores", checked(self.scores, "scores", (count,), np.float64))
         check_finite(self.boxes_px, "boxes_px")
         check_finite(self.scores, "scores")
+        u_min, v_min, u_max, v_max = self.boxes_px.T
+        if (u_min > u_max).any() or (v_min > v_max).any():
+            raise ValueError("boxes_px: expected u_min, v_min, u_max, v_max, got a box that ends before it begins")
+        if (self.scores < 0).any() or (self.scores > 1).any():
+            raise ValueError("scores: expected 0 to 1")
 
     def __len__(self) -> int:
         """The number of instances."""
         return len(self.class_names)
+
+    def check_size(self, intrinsics: Intrinsics) -> None:
+        """Raise ValueError unless the masks are of the size of the camera's images."""
+        have, want = self.masks.shape[1:], (intrinsics.height, intrinsics.width)
+        if len(self) and have != want:
+            raise ValueError(f"masks: expected the size of the frame, {want}, got {have}")
 
     def select(self, indices: npt.ArrayLike) -> "Detections":
         """The instances `indices`, in that order."""
@@ -182,8 +234,9 @@ class Observation:
     def __post_init__(self) -> None:
         """Check shapes and that the numbers are finite."""
         for name, shape in (("position_camera", (3,)), ("covariance", (3, 3))):
-            object.__setattr__(self, name, checked(getattr(self, name), name, shape, np.float64))
-            check_finite(getattr(self, name), name)
+            array = checked(getattr(self, name), name, shape, np.float64)
+            check_finite(array, name)
+            object.__setattr__(self, name, array)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -301,8 +354,9 @@ class Track:
     def __post_init__(self) -> None:
         """Check shapes and that the belief is finite."""
         for name, shape in (("mean", (6,)), ("covariance", (6, 6))):
-            object.__setattr__(self, name, checked(getattr(self, name), name, shape, np.float64))
-            check_finite(getattr(self, name), name)
+            array = checked(getattr(self, name), name, shape, np.float64)
+            check_finite(array, name)
+            object.__setattr__(self, name, array)
         object.__setattr__(self, "mask", checked(self.mask, "mask", (None, None), np.bool_))
 
     @property
@@ -363,9 +417,7 @@ class PoseEstimate:
         if (self.T_world_camera is None) != (self.status is SlamStatus.LOST):
             raise ValueError("a pose estimate has a pose exactly when it is not lost")
         if self.T_world_camera is not None:
-            pose = checked(self.T_world_camera, "T_world_camera", (4, 4), np.float64)
-            check_finite(pose, "T_world_camera")
-            object.__setattr__(self, "T_world_camera", pose)
+            object.__setattr__(self, "T_world_camera", checked_pose(self.T_world_camera, "T_world_camera"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -1,5 +1,7 @@
 """From detections and depth to positions in the camera frame: z of the paper (Tracking Using EKF, Update)."""
 
+from collections.abc import Sequence
+from math import ceil, floor, isqrt
 from typing import NamedTuple
 
 import cv2
@@ -14,7 +16,7 @@ from dotmask.tracking.measurement_noise import (
     box_centre_variance,
     centroid_variance,
     mean_depth_variance,
-    measurement_covariance,
+    measurement_covariances,
     median_depth_variance,
 )
 
@@ -23,11 +25,19 @@ _BAND_PX = 8
 _RIM_PX = 3
 """Mask pixels this close to a side of the box are what that side rests on."""
 _LINES = 64
-"""At most this many lines across a side are looked at."""
-_MEDIAN_PIXELS = 3000
+"""So many lines across a side are looked at."""
+_SAMPLES = 4000
+"""Of a box of more pixels a grid of at least so many is looked at."""
+_MEDIAN_SAMPLES = 1000
 _LEAST_DEPTH_M, _MOST_DEPTH_M = 1e-6, 1e6
+"""What lies outside is no depth."""
 _OTHER_MARGIN_M = 0.02
 """How much nearer another detection must be to count as an occluder."""
+
+_ACROSS_PX = np.arange(-_BAND_PX, _RIM_PX)[:, None]
+"""(A, 1) places along a line: from outside the box to inside of it."""
+_ALONG = (np.arange(_LINES) + 0.5) / _LINES
+"""(L,) places of the lines on a side, as shares of it."""
 
 
 class _Crop(NamedTuple):
@@ -39,8 +49,21 @@ class _Crop(NamedTuple):
     v_stop: int
 
     @property
+    def is_empty(self) -> bool:
+        return self.u_start >= self.u_stop or self.v_start >= self.v_stop
+
+    @property
     def slices(self) -> tuple[slice, slice]:
         return slice(self.v_start, self.v_stop), slice(self.u_start, self.u_stop)
+
+    def is_near(self, other: "_Crop", distance_px: int) -> bool:
+        """Whether fewer than so many pixels lie between the two."""
+        return (
+            self.u_start - distance_px < other.u_stop
+            and other.u_start - distance_px < self.u_stop
+            and self.v_start - distance_px < other.v_stop
+            and other.v_start - distance_px < self.v_stop
+        )
 
 
 def observe(detections: Detections, frame: RgbdFrame, profile: Profile) -> tuple[Observation, ...]:
@@ -50,55 +73,60 @@ def observe(detections: Detections, frame: RgbdFrame, profile: Profile) -> tuple
     pixels with depth, `z_x = (u - cx) z_z / fx` and `z_y` alike, with (u, v) the centre of the bounding box.
     `mask_centroid` takes the mean of the mask's pixels and their median depth instead. `pixel_depth` measures what the
     box centre's pixel and the mean depth are before the back-projection. R follows from the sensor's noise and, where
-    the profile says so, from how the shape of the class changes and from sides of the object that are not seen. A
-    detection with fewer than `profile.min_depth_pixels` pixels of valid depth gives no observation.
+    the profile says so, from how the shape of the class changes. A detection with fewer than
+    `profile.min_depth_pixels` pixels of valid depth, or with a box outside the image, gives no observation.
+
+    Args:
+        detections: with masks of the frame's size.
+        frame: gives the depth.
+        profile: what is measured, and how noisy it is.
     """
-    observations = []
-    labels = _label(detections, frame.intrinsics) if profile.noise.notices_hidden_sides else None
-    model = PixelDepth(intrinsics=frame.intrinsics) if profile.measurement == "pixel_depth" else CAMERA_POINT
-    for index, class_name in enumerate(detections.class_names):
-        box = detections.boxes_px[index]
-        crop = _crop(box, frame.intrinsics)
-        mask, depth_m = detections.masks[index][crop.slices], frame.depth_m[crop.slices]
-        depth_seen = _depth(mask, depth_m, profile)
-        if depth_seen is None:
+    crops = [_crop(box, frame.intrinsics) for box in detections.boxes_px.tolist()]
+    seen, pixels, sensor_variances, shape_sigmas = [], [], [], []
+    for index, crop in enumerate(crops):
+        if crop.is_empty:
             continue
-        centre, centre_variance = _centre(mask, box, crop, profile)
-        depth, depth_variance = depth_seen
-        p_camera = back_project(centre[None], np.array([depth]), frame.intrinsics)[0]
-        class_model = profile.class_model(class_name)
-        is_partial = False
-        if labels is not None:
-            view = _View(index + 1, labels, frame.depth_m, depth, profile.noise.occluder_margin_m + 0.02 * depth**2)
-            is_partial = _is_partial(view, crop, frame.intrinsics)
-        observations.append(
-            Observation(
-                position_camera=p_camera,
-                covariance=measurement_covariance(
-                    p_camera,
-                    np.array([*centre_variance, depth_variance]),
-                    model,
-                    class_model,
-                    frame.intrinsics,
-                    profile.noise,
-                ),
-                class_name=class_name,
-                detection_index=index,
-                mask=detections.masks[index],
-                model=model,
-                is_partial=is_partial,
-            )
+        mask = detections.masks[index][crop.slices]
+        depth = _depth(mask, frame.depth_m[crop.slices], profile)
+        if depth is None:
+            continue
+        centre, centre_variance = _centre(mask, detections.boxes_px[index], crop, profile)
+        seen.append(index)
+        pixels.append((*centre, depth[0]))
+        sensor_variances.append((*centre_variance, depth[1]))
+        shape_sigmas.append(profile.class_model(detections.class_names[index]).shape_sigma_m)
+    if not seen:
+        return ()
+    model = PixelDepth(intrinsics=frame.intrinsics) if profile.measurement == "pixel_depth" else CAMERA_POINT
+    measured = np.array(pixels)
+    p_camera = back_project(measured[:, :2], measured[:, 2], frame.intrinsics)
+    covariances = measurement_covariances(
+        p_camera, np.array(sensor_variances), model, np.array(shape_sigmas), frame.intrinsics, profile.noise
+    )
+    hidden: Sequence[bool] = [False] * len(seen)
+    if profile.noise.notices_hidden_sides:
+        hidden = _hidden(seen, crops, detections.masks, frame.depth_m, measured[:, 2], profile.noise.occluder_margin_m)
+    return tuple(
+        Observation(
+            position_camera=p,
+            covariance=R,
+            class_name=detections.class_names[index],
+            detection_index=index,
+            mask=detections.masks[index],
+            model=model,
+            is_partial=is_partial,
         )
-    return tuple(observations)
+        for index, p, R, is_partial in zip(seen, p_camera, covariances, hidden, strict=True)
+    )
 
 
-def _crop(box_px: FloatArray, intrinsics: Intrinsics) -> _Crop:
-    u_min, v_min, u_max, v_max = (float(x) for x in box_px)
+def _crop(box_px: Sequence[float], intrinsics: Intrinsics) -> _Crop:
+    u_min, v_min, u_max, v_max = box_px
     return _Crop(
-        u_start=max(int(np.floor(u_min)), 0),
-        u_stop=min(int(np.ceil(u_max)) + 1, intrinsics.width),
-        v_start=max(int(np.floor(v_min)), 0),
-        v_stop=min(int(np.ceil(v_max)) + 1, intrinsics.height),
+        u_start=max(floor(u_min), 0),
+        u_stop=min(ceil(u_max) + 1, intrinsics.width),
+        v_start=max(floor(v_min), 0),
+        v_stop=min(ceil(v_max) + 1, intrinsics.height),
     )
 
 
@@ -115,102 +143,149 @@ def _centre(mask: MaskImage, box_px: FloatArray, crop: _Crop, profile: Profile) 
 def _depth(mask: MaskImage, depth_m: DepthImage, profile: Profile) -> tuple[float, float] | None:
     """Mean (of a mask's centroid: median) of the depths under the mask, without what is far from their median.
 
-    Together with its variance, m and m²; None with too few pixels.
+    Together with its variance, m and m²; None with too few pixels. Of a large mask a grid of pixels is enough, unless
+    that holds too few.
     """
+    step = _step(mask.size, _SAMPLES)
+    answer = _sampled_depth(mask, depth_m, step, profile)
+    return answer if answer is not None or step == 1 else _sampled_depth(mask, depth_m, 1, profile)
+
+
+def _sampled_depth(mask: MaskImage, depth_m: DepthImage, step: int, profile: Profile) -> tuple[float, float] | None:
+    """As `_depth`, from every so many-th pixel of every so many-th row."""
+    if step > 1:
+        mask, depth_m = np.ascontiguousarray(mask[::step, ::step]), np.ascontiguousarray(depth_m[::step, ::step])
     nearest, farthest = _LEAST_DEPTH_M, _MOST_DEPTH_M
-    median = None
+    median, samples = None, 0
     if profile.depth_trim_m is not None or profile.measurement == "mask_centroid":
-        # A grid of pixels is enough.
-        step = max(1, int(np.sqrt(mask.size / _MEDIAN_PIXELS)))
-        depths = depth_m[::step, ::step][mask[::step, ::step]]
-        depths = depths[depths > 0]
-        if len(depths):
-            median = float(np.partition(depths, len(depths) // 2)[len(depths) // 2])
+        # For the trim, a rough median is enough.
+        coarse = 1 if profile.measurement == "mask_centroid" else _step(mask.size, _MEDIAN_SAMPLES)
+        depths = depth_m[::coarse, ::coarse][mask[::coarse, ::coarse]]
+        depths = depths[(depths >= nearest) & (depths <= farthest)]
+        samples = len(depths)
+        if samples:
+            median = float(np.partition(depths, samples // 2)[samples // 2])
     if median is not None and profile.depth_trim_m is not None:
-        nearest, farthest = max(median - profile.depth_trim_m, _LEAST_DEPTH_M), median + profile.depth_trim_m
+        nearest = max(median - profile.depth_trim_m, nearest)
+        farthest = min(median + profile.depth_trim_m, farthest)
     is_used = np.asarray(cv2.bitwise_and(cv2.inRange(depth_m, nearest, farthest), mask.view(np.uint8)), np.uint8)
     pixels = cv2.countNonZero(is_used)
     if pixels < profile.min_depth_pixels:
         return None
     if median is not None and profile.measurement == "mask_centroid":
-        return median, median_depth_variance(median, len(depths), profile.noise)
+        return median, median_depth_variance(median, samples, profile.noise)
     mean = float(cv2.mean(depth_m, is_used)[0])
     return mean, mean_depth_variance(mean, depth_m, is_used, pixels, profile.noise)
 
 
-class _View(NamedTuple):
-    """What the search for hidden sides looks at.
-
-    Attributes:
-        label: of the detection.
-        labels: (H, W) uint8, 0 where no detection is.
-        depth_m: (H, W).
-        distance_m: of the object.
-        margin_m: how much nearer than the object something unlabelled must be to count as an occluder and not as the
-            floor before its feet.
-    """
-
-    label: int
-    labels: npt.NDArray[np.uint8]
-    depth_m: DepthImage
-    distance_m: float
-    margin_m: float
+def _step(pixels: int, samples: int) -> int:
+    """Every so many-th pixel in both directions leaves at least `samples`, or all."""
+    return max(1, isqrt(pixels // samples))
 
 
-def _label(detections: Detections, intrinsics: Intrinsics) -> npt.NDArray[np.uint8]:
-    """(H, W) number of the detection, from 1, that each pixel belongs to; the last where masks overlap."""
-    if len(detections) > 255:
-        raise ValueError(f"observe: {len(detections)} detections, at most 255 are supported")
-    labels = np.zeros((intrinsics.height, intrinsics.width), np.uint8)
-    for index, mask in enumerate(detections.masks):
-        region = _crop(detections.boxes_px[index], intrinsics).slices
-        np.copyto(labels[region], np.uint8(index + 1), where=mask[region])
-    return labels
-
-
-def _is_partial(view: _View, crop: _Crop, intrinsics: Intrinsics) -> bool:
-    """Whether the image border, or something nearer, hides a side of the object."""
-    u0, u1, v0, v1 = crop
-    if u0 <= 1 or v0 <= 1 or u1 >= intrinsics.width - 1 or v1 >= intrinsics.height - 1:
-        return True
-    rows, columns = slice(v0, v1, 1 + (v1 - v0) // _LINES), slice(u0, u1, 1 + (u1 - u0) // _LINES)
-    if _is_covered(view, (rows, columns)):
-        return True
-    left, right = slice(max(u0 - _BAND_PX, 0), u0 + _RIM_PX), slice(u1 - _RIM_PX, u1 + _BAND_PX)
-    top, bottom = slice(max(v0 - _BAND_PX, 0), v0 + _RIM_PX), slice(v1 - _RIM_PX, v1 + _BAND_PX)
-    return (
-        _ends_behind_occluder(view, (rows, left), across_columns=True, is_high=False)
-        or _ends_behind_occluder(view, (rows, right), across_columns=True, is_high=True)
-        or _ends_behind_occluder(view, (top, columns), across_columns=False, is_high=False)
-        or _ends_behind_occluder(view, (bottom, columns), across_columns=False, is_high=True)
-    )
-
-
-def _is_covered(view: _View, box: tuple[slice, slice]) -> bool:
-    """Whether another detection, nearer than the object, takes more of the box than the object itself."""
-    labels, depth_m = view.labels[box], view.depth_m[box]
-    is_other = (labels != 0) & (labels != view.label) & (depth_m > 0) & (depth_m < view.distance_m)
-    return bool(np.count_nonzero(is_other) > np.count_nonzero(labels == view.label))
-
-
-def _ends_behind_occluder(view: _View, strip: tuple[slice, slice], *, across_columns: bool, is_high: bool) -> bool:
-    """Whether most lines that reach a side of the box have something nearer right outside of it.
+def _hidden(
+    seen: Sequence[int],
+    crops: Sequence[_Crop],
+    masks: npt.NDArray[np.bool_],
+    depth_m: DepthImage,
+    distances_m: FloatArray,
+    margin_m: float,
+) -> list[bool]:
+    """Whether the image border, or something nearer, hides a side of each of the objects `seen`.
 
     Args:
-        view: see _View.
-        strip: rows and columns from _BAND_PX outside to _RIM_PX inside the side; fewer outside at the image border.
-        across_columns: whether lines run along u (left and right side) or along v.
-        is_high: whether the side is the right or the lower one.
+        seen: which detections are meant.
+        crops: of all detections.
+        masks: (N, H, W) of all detections; where two overlap, the pixel belongs to the later one.
+        depth_m: (H, W).
+        distances_m: (len(seen),) depths of the objects.
+        margin_m: how much nearer than an object something that is no detection must be to count as an occluder and not
+            as the floor before its feet; grows with the distance.
     """
-    labels, depth_m = view.labels[strip], view.depth_m[strip]
-    if across_columns:
-        labels, depth_m = labels.T, depth_m.T
-    if is_high:
-        labels, depth_m = labels[::-1], depth_m[::-1]
-    labels, depth_m = np.ascontiguousarray(labels), np.ascontiguousarray(depth_m)
-    outside, others = depth_m[:-_RIM_PX], labels[:-_RIM_PX]
-    own = np.where(labels[-_RIM_PX:] == view.label, depth_m[-_RIM_PX:], np.float32(0)).max(axis=0)
-    is_other = (others != 0) & (others != view.label)
-    nearer = np.where(is_other, own - np.float32(_OTHER_MARGIN_M), own - np.float32(view.margin_m))
-    is_nearer = ((outside > 0) & (outside < nearer)).any(axis=0)
-    return bool(2 * np.count_nonzero(is_nearer) > np.count_nonzero(own))
+    height, width = depth_m.shape
+    is_hidden = [True] * len(seen)
+    inside = []
+    for place, index in enumerate(seen):
+        u0, u1, v0, v1 = crop = crops[index]
+        if u0 <= 1 or v0 <= 1 or u1 >= width - 1 or v1 >= height - 1:
+            continue
+        over = [j for j, other in enumerate(crops) if j != index and not other.is_empty and crop.is_near(other, 0)]
+        if not over or not _is_covered(index, over, crop, masks, depth_m, float(distances_m[place])):
+            inside.append(place)
+    if inside:
+        within = [seen[place] for place in inside]
+        for place, answer in zip(
+            inside, _ends_behind_occluder(within, crops, masks, depth_m, distances_m[inside], margin_m), strict=True
+        ):
+            is_hidden[place] = answer
+    return is_hidden
+
+
+def _is_covered(
+    index: int,
+    over: Sequence[int],
+    crop: _Crop,
+    masks: npt.NDArray[np.bool_],
+    depth_m: DepthImage,
+    distance_m: float,
+) -> bool:
+    """Whether other detections, nearer than the object, take more of its box than the object itself."""
+    u0, u1, v0, v1 = crop
+    grid = (slice(v0, v1, 1 + (v1 - v0) // _LINES), slice(u0, u1, 1 + (u1 - u0) // _LINES))
+    own = masks[index][grid].copy()
+    others = np.zeros_like(own)
+    for j in over:
+        mask = masks[j][grid]
+        if j > index:
+            own &= ~mask
+        others |= mask
+    depths = depth_m[grid]
+    is_covered = others & ~own & (depths > 0) & (depths < distance_m)
+    return bool(np.count_nonzero(is_covered) > np.count_nonzero(own))
+
+
+def _ends_behind_occluder(
+    within: Sequence[int],
+    crops: Sequence[_Crop],
+    masks: npt.NDArray[np.bool_],
+    depth_m: DepthImage,
+    distances_m: FloatArray,
+    margin_m: float,
+) -> list[bool]:
+    """Whether most lines that reach one of the four sides of a box have something nearer right outside of it.
+
+    The four sides of all boxes are looked at together: arrays are (M, 4, A, L), L lines across each side, with A pixels
+    from `_BAND_PX` outside to `_RIM_PX` inside. What would lie outside the image is its border.
+
+    Args:
+        within: the M detections that are meant.
+        crops: of all detections.
+        masks: (N, H, W) of all detections.
+        depth_m: (H, W).
+        distances_m: (M,) depths of the objects.
+        margin_m: see `_hidden`.
+    """
+    u0, u1, v0, v1 = np.array([crops[index] for index in within]).T[:, :, None, None]
+    height, width = depth_m.shape
+    low, high = _ACROSS_PX, -1 - _ACROSS_PX
+    columns, rows = u0 + ((u1 - u0) * _ALONG).astype(np.intp), v0 + ((v1 - v0) * _ALONG).astype(np.intp)
+    left, right = width * rows + np.maximum(u0 + low, 0), width * rows + np.minimum(u1 + high, width - 1)
+    top, bottom = columns + width * np.maximum(v0 + low, 0), columns + width * np.minimum(v1 + high, height - 1)
+    places = np.stack([left, right, top, bottom], axis=1)
+    depths = depth_m.ravel().take(places)
+    outside, rim = depths[:, :, :-_RIM_PX], depths[:, :, -_RIM_PX:]
+    margins = np.empty(outside.shape, np.float32)
+    margins[:] = (margin_m + 0.02 * distances_m**2)[:, None, None, None]
+    for place, index in enumerate(within):
+        out, on = places[place, :, :-_RIM_PX], places[place, :, -_RIM_PX:]
+        is_own = masks[index].ravel().take(on)
+        for j, other in enumerate(crops):
+            if j != index and not other.is_empty and crops[index].is_near(other, _BAND_PX):
+                np.copyto(margins[place], _OTHER_MARGIN_M, where=masks[j].ravel().take(out))
+                if j > index:
+                    is_own &= ~masks[j].ravel().take(on)
+        rim[place] *= is_own & (rim[place] <= _MOST_DEPTH_M)
+    own = rim.max(axis=2, keepdims=True)
+    is_nearer = ((outside > 0) & (outside < own - margins)).any(axis=2)
+    is_hidden = 2 * np.count_nonzero(is_nearer, axis=-1) > np.count_nonzero(own[:, :, 0], axis=-1)
+    return [bool(answer) for answer in is_hidden.any(axis=1)]

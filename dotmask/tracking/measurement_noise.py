@@ -20,10 +20,11 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from dotmask.profiles import ClassModel, MeasurementNoise
+from dotmask.profiles import MeasurementNoise
 from dotmask.records import DepthImage, FloatArray, Intrinsics, MaskImage, MeasurementModel
 from dotmask.tracking.measurement_model import PixelDepth
 
+_AXES = np.arange(3)
 _CROSS = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
 
 
@@ -82,34 +83,45 @@ def median_depth_variance(depth_m: float, pixels: int, noise: MeasurementNoise) 
     return 0.5 * np.pi * _depth_sigma(depth_m, noise) ** 2 / pixels + _step_variance(depth_m, noise)
 
 
-def measurement_covariance(
+def measurement_covariances(
     p_camera: FloatArray,
-    sensor_variance: FloatArray,
+    sensor_variances: FloatArray,
     model: MeasurementModel,
-    class_model: ClassModel,
+    shape_sigmas_m: FloatArray,
     intrinsics: Intrinsics,
     noise: MeasurementNoise,
 ) -> FloatArray:
-    """R (3, 3) of what `model` measures, in the units of that.
+    """R (N, 3, 3) of what `model` measures, in the units of that.
 
     Args:
-        p_camera: (3,) where the object is seen, metres.
-        sensor_variance: (3,) of u and v (px²) and of the depth (m²) that `p_camera` was computed from.
+        p_camera: (N, 3) where the objects are seen, metres.
+        sensor_variances: (N, 3) of u and v (px²) and of the depth (m²) that `p_camera` was computed from.
         model: what is measured.
-        class_model: how much the shape of the class changes.
+        shape_sigmas_m: (N, 3) how much the shapes of their classes change.
         intrinsics: of the camera.
         noise: see MeasurementNoise.
     """
-    sensor = np.diag(sensor_variance)
-    shape = np.diag(np.array(class_model.shape_sigma_m) ** 2)
-    metric = shape + _pose_covariance(p_camera, noise)
+    metric = _pose_covariances(p_camera, noise)
+    metric[:, _AXES, _AXES] += shape_sigmas_m**2
     if isinstance(model, PixelDepth):
         J = model.jacobian(p_camera)
-        return np.asarray(sensor + J @ metric @ J.T)
-    back = np.linalg.inv(PixelDepth(intrinsics=intrinsics).jacobian(p_camera))
+        R = J @ metric @ J.swapaxes(1, 2)
+        R[:, _AXES, _AXES] += sensor_variances
+        return np.asarray(R)
+    back = _back_projection_jacobian(p_camera, intrinsics)
     if noise.is_diagonal:
-        back = np.diag(np.diag(back))
-    return np.asarray(back @ sensor @ back.T + metric)
+        metric[:, _AXES, _AXES] += back[:, _AXES, _AXES] ** 2 * sensor_variances
+        return metric
+    return np.asarray((back * sensor_variances[:, None]) @ back.swapaxes(1, 2) + metric)
+
+
+def _back_projection_jacobian(p_camera: FloatArray, intrinsics: Intrinsics) -> FloatArray:
+    """(N, 3, 3) derivative of points (N, 3) with respect to the pixel u, v and the depth that they come from."""
+    J = np.zeros((len(p_camera), 3, 3))
+    z = p_camera[:, 2]
+    J[:, 0, 0], J[:, 1, 1] = z / intrinsics.fx, z / intrinsics.fy
+    J[:, :, 2] = p_camera / z[:, None]
+    return J
 
 
 def _outline(shape: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
@@ -137,8 +149,10 @@ def _step_variance(depth_m: float, noise: MeasurementNoise) -> float:
     return (noise.depth_step_per_m * depth_m**2) ** 2 / 12.0
 
 
-def _pose_covariance(p_camera: FloatArray, noise: MeasurementNoise) -> FloatArray:
-    """(3, 3) of a point in the camera frame of a camera that may be turned by w and shifted by t: `dp = w x p + t`."""
-    x, y, z = p_camera
-    turned = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
-    return np.asarray(noise.pose_rotation_sigma_rad**2 * turned @ turned.T + noise.pose_position_sigma_m**2 * np.eye(3))
+def _pose_covariances(p_camera: FloatArray, noise: MeasurementNoise) -> FloatArray:
+    """(N, 3, 3) of points (N, 3) seen by a camera that may be turned by w and shifted by t: `dp = w x p + t`."""
+    turn, shift = noise.pose_rotation_sigma_rad**2, noise.pose_position_sigma_m**2
+    # The matrix A of w x p = A w has A Aᵀ = |p|² I - p pᵀ.
+    covariances = -turn * p_camera[:, :, None] * p_camera[:, None]
+    covariances[:, _AXES, _AXES] += turn * (p_camera**2).sum(axis=1, keepdims=True) + shift
+    return covariances

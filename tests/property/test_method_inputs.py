@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
+from scipy.spatial.transform import Rotation
 
 from dotmask.pipeline import DotMask, FrontEndResult
-from dotmask.profiles import CALIBRATED, PAPER, Profile
+from dotmask.profiles import CALIBRATED, PAPER, MaskGrowth, Profile
 from dotmask.records import Detections, Intrinsics, RgbdFrame
 
 CAMERA = Intrinsics(width=64, height=48, fx=50.0, fy=50.0, cx=31.5, cy=23.5)
@@ -84,6 +85,16 @@ class Walk:
         return result
 
 
+class Shown:
+    """A segmenter that answers with what is in the frames that it was told of."""
+
+    def __init__(self, frames: list[Given]) -> None:
+        self._frames = {frame.index: frame for frame in frames}
+
+    def segment(self, frame: RgbdFrame) -> Detections:
+        return self._frames[frame.index].segment(frame)
+
+
 NEXT = good(GOOD_FRAMES)
 
 
@@ -96,8 +107,8 @@ def assert_same(one: FrontEndResult, other: FrontEndResult) -> None:
 def assert_same_tracks(one: FrontEndResult, other: FrontEndResult) -> None:
     assert len(one.tracks) == len(other.tracks)
     for a, b in zip(one.tracks, other.tracks, strict=True):
-        assert (a.track_id, a.age_frames, a.misses, a.detection_index, a.verdict) == (
-            (b.track_id, b.age_frames, b.misses, b.detection_index, b.verdict)
+        assert (a.track_id, a.hits, a.phase, a.misses, a.detection_index, a.verdict) == (
+            (b.track_id, b.hits, b.phase, b.misses, b.detection_index, b.verdict)
         )
         np.testing.assert_array_equal(a.mean, b.mean)
         np.testing.assert_array_equal(a.covariance, b.covariance)
@@ -107,6 +118,19 @@ def assert_same_tracks(one: FrontEndResult, other: FrontEndResult) -> None:
 
 NOT_FINITE_POSE = np.eye(4)
 NOT_FINITE_POSE[0, 3] = np.nan
+MIRRORED = np.diag([1.0, 1, -1, 1])
+
+
+def with_depth(depth: float) -> Given:
+    """One pixel beside the object has this depth."""
+    depth_m = NEXT.depth_m.copy()
+    depth_m[2, 3] = depth
+    return replace(NEXT, depth_m=depth_m)
+
+
+def with_box(*box: float) -> Given:
+    return replace(NEXT, boxes_px=np.array([box], float))
+
 
 REFUSED = {
     "a repeated time stamp": (replace(NEXT, timestamp_s=good(GOOD_FRAMES - 1).timestamp_s), "not later"),
@@ -115,7 +139,19 @@ REFUSED = {
     "a score that is not a number": (replace(NEXT, scores=np.array([np.nan])), "scores: .* not finite"),
     "a box that is not finite": (replace(NEXT, boxes_px=np.full((1, 4), np.inf)), "boxes_px: .* not finite"),
     "fewer boxes than masks": (replace(NEXT, boxes_px=np.zeros((0, 4))), "boxes_px: expected shape"),
+    "a score above 1": (replace(NEXT, scores=np.array([1.5])), "scores: expected 0 to 1"),
+    "a score below 0": (replace(NEXT, scores=np.array([-0.1])), "scores: expected 0 to 1"),
+    "a box from right to left": (with_box(30, 10, 10, 29), "boxes_px: .* ends before it begins"),
+    "a box from below to above": (with_box(10, 29, 30, 10), "boxes_px: .* ends before it begins"),
+    "masks that are smaller than the frame": (replace(NEXT, masks=np.ones((1, 24, 32), bool)), "masks: expected .*48"),
+    "masks that are larger than the frame": (replace(NEXT, masks=np.ones((1, 96, 128), bool)), "masks: expected .*48"),
+    **{f"a depth of {d}": (with_depth(d), r"depth_m: .* np\.where") for d in (np.nan, np.inf, -np.inf, -1.0)},
     "a camera pose that is not finite": (replace(NEXT, T_world_camera=NOT_FINITE_POSE), "not finite"),
+    "a camera pose of 3x3": (replace(NEXT, T_world_camera=np.eye(3)), r"T_world_camera: expected shape \(4, 4\)"),
+    "a camera pose of zeros": (replace(NEXT, T_world_camera=np.zeros((4, 4))), "last row"),
+    "a camera pose with a scale": (replace(NEXT, T_world_camera=np.diag([2.0, 2, 2, 1])), "no rotation"),
+    "a camera pose with a scale in its last row": (replace(NEXT, T_world_camera=2 * np.eye(4)), "last row"),
+    "a camera pose with a mirror": (replace(NEXT, T_world_camera=MIRRORED), "no rotation"),
 }
 
 
@@ -142,27 +178,50 @@ def test_a_segmenter_that_fails_leaves_the_state_alone(profile: Profile) -> None
 
 
 @BY_PROFILE
-def test_refinement_with_a_pose_that_is_not_finite_is_refused_with_the_state_left_alone(profile: Profile) -> None:
+@pytest.mark.parametrize("pose", [NOT_FINITE_POSE, np.eye(3), MIRRORED], ids=["not finite", "3x3", "mirror"])
+def test_refinement_with_a_pose_that_is_none_is_refused_with_the_state_left_alone(
+    pose: np.ndarray, profile: Profile
+) -> None:
     walk = Walk(profile)
-    with pytest.raises(ValueError, match="not finite"):
-        walk.method.refine(NOT_FINITE_POSE)
+    with pytest.raises(ValueError, match="T_world_camera: "):
+        walk.method.refine(pose)
     assert_same_tracks(walk.method.refine(np.eye(4)), Walk(profile).method.refine(np.eye(4)))
     assert_same(walk.step(NEXT), Walk(profile).step(NEXT))
+
+
+@BY_PROFILE
+@pytest.mark.parametrize("timestamp_s", [good(GOOD_FRAMES - 1).timestamp_s, 0.5 / RATE_HZ], ids=["repeated", "earlier"])
+def test_a_stamp_of_the_past_is_refused_where_no_track_lives(timestamp_s: float, profile: Profile) -> None:
+    nothing = {"masks": np.zeros((0, *SIZE), bool), "boxes_px": np.zeros((0, 4)), "class_names": ()}
+    empty = [replace(good(k), **nothing, scores=np.zeros(0)) for k in range(GOOD_FRAMES)]
+    method = DotMask(Shown(empty), profile)
+    for frame in empty:
+        assert method.step(frame.frame, np.eye(4)).tracks == ()
+    with pytest.raises(ValueError, match="not later"):
+        method.step(replace(NEXT, timestamp_s=timestamp_s).frame, np.eye(4))
+
+
+@BY_PROFILE
+def test_a_pose_of_single_precision_is_good_enough(profile: Profile) -> None:
+    T = np.eye(4)
+    T[:3, :3] = Rotation.from_rotvec([0.3, -0.2, 0.5]).as_matrix()
+    walk = Walk(profile)
+    walk.step(replace(NEXT, T_world_camera=T.astype(np.float32)))
 
 
 # ---- stated outcomes --------------------------------------------------------------------------------
 
 
 @BY_PROFILE
-@pytest.mark.parametrize("depth", [np.nan, -np.inf, -1.0, 1e-9], ids=str)
-def test_depth_under_a_mask_that_is_no_positive_number_counts_as_no_return(depth: float, profile: Profile) -> None:
+@pytest.mark.parametrize("depth", [1e-9, 1e7, 3e38], ids=str)
+def test_depth_under_a_mask_that_no_camera_measures_counts_as_no_return(depth: float, profile: Profile) -> None:
     is_odd = NEXT.masks[0] & (np.arange(CAMERA.width) % 3 == 0)
     odd, none = (replace(NEXT, depth_m=np.where(is_odd, d, NEXT.depth_m).astype(np.float32)) for d in (depth, 0.0))
     assert_same(Walk(profile).step(odd), Walk(profile).step(none))
 
 
 @BY_PROFILE
-@pytest.mark.parametrize("depth", [0.0, np.nan, -1.0], ids=str)
+@pytest.mark.parametrize("depth", [0.0, 1e-9, 1e7], ids=str)
 def test_without_any_depth_under_its_mask_an_object_is_removed_and_its_track_coasts(
     depth: float, profile: Profile
 ) -> None:
@@ -224,8 +283,28 @@ def test_a_box_that_reaches_out_of_the_image_is_measured_by_what_is_inside(
     result = Walk(profile).step(replace(NEXT, masks=inside[None], boxes_px=box, depth_m=depth))
     (observation,) = result.observations
     assert observation.position_camera[2] == pytest.approx(OBJECT_M)
-    assert observation.is_partial == profile.noise.inflates_hidden_sides
+    assert observation.is_partial == profile.noise.notices_hidden_sides
     assert (result.masked.mdi_m[inside] == 0).all()
+
+
+@BY_PROFILE
+@pytest.mark.parametrize(
+    "box",
+    [[70, 10, 90, 29], [10, 50, 29, 70], [-20, 10, -5, 29], [10, -20, 29, -5], [-1e9, -1e9, -1e8, -1e8]],
+    ids=["right", "below", "left", "above", "far away"],
+)
+def test_a_box_outside_the_image_is_not_measured_and_its_mask_is_removed(box: list[float], profile: Profile) -> None:
+    result = Walk(profile).step(with_box(*box))
+    assert not result.observations
+    assert [track.misses for track in result.tracks] == [1]
+    assert not result.masked.mo_mdi_m[NEXT.masks[0]].any()
+
+
+@BY_PROFILE
+@pytest.mark.parametrize("box", [[-1e300, 0, 1e300, 47], [-1e6, -1e6, 1e6, 1e6]], ids=str)
+def test_a_box_far_larger_than_the_image_is_measured_by_its_mask(box: list[float], profile: Profile) -> None:
+    (observation,) = Walk(profile).step(with_box(*box)).observations
+    assert observation.position_camera[2] == pytest.approx(OBJECT_M)
 
 
 @BY_PROFILE
@@ -249,7 +328,7 @@ def test_after_an_hour_without_frames_an_object_is_where_it_is_seen(profile: Pro
     np.testing.assert_allclose(track.position_world, result.observations[0].position_camera, atol=1e-3)
 
 
-odd_depths = hnp.arrays(np.float32, SIZE, elements=st.sampled_from([0.0, np.nan, -1.0, 0.4, 1.0, 2.0, 2.1, 9.0, 60.0]))
+odd_depths = hnp.arrays(np.float32, SIZE, elements=st.sampled_from([0.0, 1e-9, 0.4, 1.0, 2.0, 2.1, 9.0, 60.0, 1e7]))
 
 
 @BY_PROFILE
@@ -268,7 +347,7 @@ def test_whatever_is_seen_states_stay_finite_and_every_removed_pixel_lies_under_
 ) -> None:
     boxes = np.array([[min(a, c), min(b, d), max(a, c), max(b, d)] for a, b, c, d in corners], float)
     masks = np.array([rectangle(*(int(x) for x in box)) for box in boxes])
-    walk = Walk(replace(profile, dilation_px=0, coasting_mask_frames=0))
+    walk = Walk(replace(profile, growth=MaskGrowth(base_px=0.0), coasting_mask_frames=0))
     for k, depth_m in enumerate(depths):
         count = len(boxes)
         class_names = tuple(data.draw(st.sampled_from(["person", "chair"])) for _ in range(count))
