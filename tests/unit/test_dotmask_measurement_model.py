@@ -80,7 +80,7 @@ def test_near_the_truth_both_models_lead_to_the_same_belief() -> None:
     np.testing.assert_allclose(pixels.mean, linear.mean, atol=5e-6)
     np.testing.assert_allclose(pixels.covariance, linear.covariance, atol=1e-8)
     born = initiate(seen(POINTS[0], PIXEL_DEPTH), 0.0, T, PAPER, 1)
-    innovation = innovate(born, seen(POINTS[0] + 1e-3, PIXEL_DEPTH), T)
+    innovation, _ = innovate(born, seen(POINTS[0] + 1e-3, PIXEL_DEPTH), T)
     expected = PIXEL_DEPTH.measured(POINTS[0] + 1e-3) - PIXEL_DEPTH.measured(POINTS[0])
     np.testing.assert_allclose(innovation.residual, expected, atol=1e-9)
     np.testing.assert_allclose((inverse(T) @ [*born.position_world, 1])[:3], POINTS[0], atol=1e-12)

@@ -4,7 +4,7 @@ import pytest
 from dotmask.profiles import CALIBRATED, PAPER
 from dotmask.records import Intrinsics, Observation, SurfaceMotion, TrackPhase
 from dotmask.tracking.measurement_model import CAMERA_POINT
-from dotmask.tracking.tracker import TrackerState, track_objects
+from dotmask.tracking.tracker import TrackerState, predict_tracks, update_tracks
 
 DT = 1 / 30
 CAMERA = Intrinsics(width=32, height=24, fx=26.0, fy=26.0, cx=15.5, cy=11.5)
@@ -32,7 +32,7 @@ def step(state, k, *objects, profile=PAPER, T_world_camera=None, is_partial=Fals
     observations = frame(*objects, is_partial=is_partial)
     pose = np.eye(4) if T_world_camera is None else T_world_camera
     surfaces = (None,) * len(objects) if surfaces is None else surfaces
-    return track_objects(state, observations, surfaces, k * dt, pose, CAMERA, profile)
+    return update_tracks(predict_tracks(state, k * dt, profile), observations, surfaces, pose, CAMERA, profile)
 
 
 def test_a_new_object_starts_a_track_and_the_next_frame_updates_it() -> None:
