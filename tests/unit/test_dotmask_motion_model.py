@@ -97,6 +97,15 @@ def test_misprint_b_cross_terms_must_scale_like_a_covariance() -> None:
     assert printed[0] / np.sqrt(metres[0, 0] * metres[3, 3]) < 0.05
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_process_noise_is_gamma_sigma_gamma_transposed(seed) -> None:
+    rng = np.random.default_rng(seed)
+    dt, sigmas = rng.uniform(1e-3, 2.0), rng.uniform(0.01, 3.0, 3)
+    Gamma = np.vstack([0.5 * dt**2 * np.eye(3), dt * np.eye(3)])
+    expected = Gamma @ np.diag(sigmas**2) @ Gamma.T
+    np.testing.assert_allclose(process_noise(dt, sigmas), expected, rtol=1e-12, atol=0)
+
+
 def test_calibrated_objects_on_the_floor_hardly_accelerate_upwards() -> None:
     P = np.diag(predict(track_at(np.zeros(6), np.zeros((6, 6)) + 1e-12 * np.eye(6)), 2.1, CALIBRATED).covariance)
     assert P[5] == pytest.approx(0.04 * P[4], rel=1e-3)

@@ -280,11 +280,11 @@ def test_a_point_that_leaves_every_mask_is_lost() -> None:
 def test_points_are_refilled_when_too_few_are_left() -> None:
     v = np.arange(CAMERA.height)[:, None]
     frame, whole = picture(0, pose())
-    views = [(frame, detect(whole.masks[0] & (v < 85))), *((picture(k, pose())[0], whole) for k in (1, 2))]
+    views = [(frame, detect(whole.masks[0] & (v < 109))), *((picture(k, pose())[0], whole) for k in (1, 2))]
     few, refilled, same = followed(views, [pose()] * 3)
-    assert 0 < len(few.pixels) < 0.75 * SETTINGS.points
+    assert 0.55 * SETTINGS.points < len(few.pixels) < 0.7 * SETTINGS.points
     assert 0.75 * SETTINGS.points <= len(refilled.pixels) <= SETTINGS.points
-    assert np.count_nonzero(refilled.pixels[:, 1] > 43) > 5, "the new ones are where it was hidden"
+    assert np.count_nonzero(refilled.pixels[:, 1] > 55) > 5, "the new ones are where it was hidden"
     assert np.count_nonzero(np.isfinite(refilled.past_world[:, 0, 0])) == len(few.pixels), "the old ones go on"
     assert len(same.pixels) == len(refilled.pixels), "enough of them: nothing is looked for"
     distances = np.linalg.norm(refilled.pixels[:, None] - refilled.pixels[None], axis=-1)
@@ -378,15 +378,16 @@ def test_the_points_of_a_pattern_that_stands_stand_while_the_camera_turns(camera
 
 
 def test_new_points_are_spread_over_the_object() -> None:
-    """Of each third of the rectangle there are some, although one of them has by far the strongest corners."""
-    frame, detections = picture(0, pose(), contrast=0.5)
-    loud, _ = picture(0, pose())
-    _, strong = picture(0, pose(), half_size_m=(HALF_WIDTH_M / 3, HALF_HEIGHT_M))
+    """Of each third of a large rectangle there are some, although one of them has by far the strongest corners."""
+    half_width_m, half_height_m = 0.55, 0.8
+    frame, detections = picture(0, pose(), contrast=0.4, half_size_m=(half_width_m, half_height_m))
+    loud, _ = picture(0, pose(), half_size_m=(half_width_m, half_height_m))
+    _, strong = picture(0, pose(), half_size_m=(half_width_m / 3, half_height_m))
     rgb = np.where(strong.masks[0][..., None], loud.rgb, frame.rgb)
     [points] = followed([(replace(frame, rgb=rgb), detections)], [pose()])
     assert len(points.pixels) >= 0.75 * SETTINGS.points
-    by_third, _ = np.histogram(points.p_camera[:, 0], HALF_WIDTH_M * np.array([-1, -1 / 3, 1 / 3, 1]))
-    assert by_third.min() >= 0.15 * SETTINGS.points
+    by_third, _ = np.histogram(points.p_camera[:, 0], half_width_m * np.array([-1, -1 / 3, 1 / 3, 1]))
+    assert by_third.min() >= 0.1 * SETTINGS.points
 
 
 @pytest.mark.parametrize(("grey_levels", "is_kept"), [(4, True), (16, False)])
