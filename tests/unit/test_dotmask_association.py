@@ -36,7 +36,7 @@ def track(position, class_name="chair", mask=None, mask_position=None) -> Track:
         mask=rectangle() if mask is None else mask,
         mask_timestamp_s=0.0,
         mask_position_camera=np.asarray(position if mask_position is None else mask_position, float),
-        partial_timestamp_s=0.0,
+        is_partial=False,
     )
 
 

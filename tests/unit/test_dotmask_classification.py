@@ -1,3 +1,4 @@
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -17,12 +18,23 @@ def rectangle(u0, v0, u1, v1):
 STANDING = rectangle(50, 20, 79, 99)
 
 
-def surface(share) -> SurfaceMotion:
-    return SurfaceMotion(points=20, moving_share=share, velocity_world=np.zeros(3), covariance=np.eye(3))
+def surface(share, speed=0.0) -> SurfaceMotion:
+    velocity = np.array([0.0, 0.6 * speed, -0.8 * speed])
+    return SurfaceMotion(points=20, moving_share=share, velocity_world=velocity, covariance=np.eye(3))
 
 
-def track(speed, class_name="person", mask=STANDING, sigma_v=0.02, misses=0, verdict=None, share=None) -> Track:
-    """`share` of its surface's points move; None: there are none."""
+def track(
+    speed,
+    class_name="person",
+    mask=STANDING,
+    sigma_v=0.02,
+    misses=0,
+    verdict=None,
+    share=None,
+    surface_speed=0.0,
+    is_partial=False,
+) -> Track:
+    """`share` of its surface's points move, at `surface_speed`; None: there are none."""
     return Track(
         track_id=1,
         class_name=class_name,
@@ -36,8 +48,8 @@ def track(speed, class_name="person", mask=STANDING, sigma_v=0.02, misses=0, ver
         mask=mask,
         mask_timestamp_s=1.0,
         mask_position_camera=np.array([0, 0, 2.0]),
-        partial_timestamp_s=0.0,
-        surface=None if share is None else surface(share),
+        is_partial=is_partial,
+        surface=None if share is None else surface(share, surface_speed),
         verdict=verdict,
     )
 
@@ -84,27 +96,36 @@ def test_a_new_track_is_kept_by_the_paper_and_masked_by_the_calibrated_profile()
     assert (kept.is_moving, kept.reason) == (False, Reason.NEW)
 
 
-def test_a_new_track_is_idle_after_the_calm_frames() -> None:
+PATIENCE = [
+    CALIBRATED,
+    replace(CALIBRATED, name="slow to believe", proof_frames=6, calm_frames=3),
+    replace(CALIBRATED, name="quick to believe", proof_frames=1, calm_frames=4),
+]
+
+
+@pytest.mark.parametrize("profile", PATIENCE, ids=lambda p: p.name)
+def test_a_new_track_is_idle_after_the_frames_that_prove_it(profile) -> None:
     before, reasons = None, []
-    for _ in range(CALIBRATED.calm_frames + 1):
+    for _ in range(profile.proof_frames + 1):
         now = track(0.0)
-        now = replace(now, verdict=classify(now, before, CALIBRATED))
+        now = replace(now, verdict=classify(now, before, profile))
         assert now.verdict is not None
         reasons.append(now.verdict.reason)
         before = now
-    assert reasons == [Reason.NEW] * (CALIBRATED.calm_frames - 1) + [Reason.IDLE] * 2
+    assert reasons == [Reason.NEW] * (profile.proof_frames - 1) + [Reason.IDLE] * 2
 
 
-def test_a_mover_is_idle_only_after_the_calm_frames() -> None:
+@pytest.mark.parametrize("profile", PATIENCE, ids=lambda p: p.name)
+def test_a_mover_is_idle_only_after_the_calm_frames(profile) -> None:
     before = track(1.0, verdict=Verdict(is_moving=True, reason=Reason.SPEED, speed_m_s=1.0, mask_iou=None))
     flags = []
-    for _ in range(CALIBRATED.calm_frames):
+    for _ in range(profile.calm_frames):
         now = track(0.0)
-        now = replace(now, verdict=classify(now, before, CALIBRATED))
+        now = replace(now, verdict=classify(now, before, profile))
         assert now.verdict is not None
         flags.append(now.verdict.is_moving)
         before = now
-    assert flags == [True] * (CALIBRATED.calm_frames - 1) + [False]
+    assert flags == [True] * (profile.calm_frames - 1) + [False]
 
 
 def test_calibrated_speed_must_stand_out_from_its_own_uncertainty() -> None:
@@ -145,7 +166,7 @@ SHAPES = {
 
 @pytest.mark.parametrize("speed", [0.0, 1.0])
 @pytest.mark.parametrize("shape", SHAPES)
-def test_of_a_person_the_share_of_moving_points_decides_alone(speed, shape) -> None:
+def test_of_a_person_whose_surface_as_a_whole_rests_the_share_of_moving_points_decides(speed, shape) -> None:
     """Neither a speed, which a half hidden box may feign, nor a mask that changes its shape has a say beside it."""
     before, least = track(0.0, verdict=idle()), CALIBRATED.class_model("person").moving_share
     still = classify(track(speed, mask=SHAPES[shape], share=0.99 * least), before, CALIBRATED)
@@ -156,24 +177,85 @@ def test_of_a_person_the_share_of_moving_points_decides_alone(speed, shape) -> N
 
 
 @pytest.mark.parametrize("class_name", ["chair", "cup"])
-def test_a_thing_moves_if_it_is_fast_and_most_of_its_surface_moves(class_name) -> None:
+def test_a_thing_moves_if_it_is_fast_and_its_surface_says_so_by_share_or_by_velocity(class_name) -> None:
+    """What comes straight at the camera leaves its pixels late: then the velocity of its surface tells."""
     before, model = track(0.0, class_name, verdict=idle()), CALIBRATED.class_model(class_name)
-    answers = {}
-    for is_fast in (False, True):
-        for has_share in (False, True):
-            speed = model.speed_threshold_m_s * (1.5 if is_fast else 0.9)
-            share = model.moving_share * (1.0 if has_share else 0.99)
-            now = track(speed, class_name, sigma_v=1e-3, share=share)
-            answers[is_fast, has_share] = classify(now, before, CALIBRATED)
-    for case, verdict in answers.items():
-        assert verdict.is_moving == (case == (True, True)), case
-        assert verdict.reason is (Reason.SPEED if case == (True, True) else Reason.IDLE)
+    for is_fast, has_share, is_surface_fast in itertools.product((False, True), repeat=3):
+        now = track(
+            model.speed_threshold_m_s * (1.5 if is_fast else 0.9),
+            class_name,
+            sigma_v=1e-3,
+            share=model.moving_share * (1.0 if has_share else 0.99),
+            surface_speed=model.speed_threshold_m_s * (1.01 if is_surface_fast else 0.99),
+        )
+        verdict = classify(now, before, CALIBRATED)
+        moves = is_fast and (has_share or is_surface_fast)
+        assert verdict.is_moving == moves, (is_fast, has_share, is_surface_fast)
+        assert verdict.reason is (Reason.SPEED if moves else Reason.IDLE)
 
 
-def test_a_thing_whose_surface_moves_must_still_be_faster_than_its_uncertainty() -> None:
-    before = track(0.0, "chair", verdict=idle(7))
-    unsure = classify(track(0.5, "chair", sigma_v=0.3, share=1.0), before, CALIBRATED)
-    assert (unsure.is_moving, unsure.calm_frames) == (False, 7)
+@pytest.mark.parametrize("surface_speed", [0.0, 0.5])
+def test_a_thing_whose_surface_moves_must_still_be_faster_than_its_uncertainty(surface_speed) -> None:
+    before = track(0.0, "chair", verdict=idle())
+    for sigma_v, moves in ((0.3, False), (0.1, True)):
+        now = track(0.5, "chair", sigma_v=sigma_v, share=1.0, surface_speed=surface_speed)
+        assert classify(now, before, CALIBRATED).is_moving == moves
+
+
+def test_a_person_who_is_fast_as_a_whole_moves_by_speed_and_by_a_share_of_the_surface_otherwise() -> None:
+    before, least = track(0.0, verdict=idle()), CALIBRATED.class_model("person").moving_share
+    for share, surface_speed, reason in (
+        (0.99 * least, 0.5, Reason.SPEED),
+        (0.99 * least, 0.0, Reason.IDLE),
+        (least, 0.5, Reason.SURFACE),
+    ):
+        assert classify(track(0.5, share=share, surface_speed=surface_speed), before, CALIBRATED).reason is reason
+
+
+@pytest.mark.parametrize(
+    ("class_name", "speed", "why"), [("person", 0.0, Reason.SURFACE), ("chair", 0.5, Reason.SPEED)]
+)
+def test_to_be_taken_for_moving_asks_for_a_larger_share_than_to_stay_so(class_name, speed, why) -> None:
+    model = CALIBRATED.class_model(class_name)
+    enter, stay = model.moving_share, model.still_moving_share
+    assert stay < enter
+    moving = Verdict(is_moving=True, reason=why, speed_m_s=speed, mask_iou=None)
+    new = Verdict(is_moving=True, reason=Reason.NEW, speed_m_s=speed, mask_iou=None)
+    for known, least in ((moving, stay), (idle(), enter), (new, enter)):
+        before = track(0.0, class_name, verdict=known)
+        above = classify(track(speed, class_name, share=least), before, CALIBRATED)
+        below = classify(track(speed, class_name, share=0.99 * least), before, CALIBRATED)
+        assert (above.is_moving, above.reason, above.calm_frames) == (True, why, 0)
+        assert below.calm_frames == known.calm_frames + 1, "it speaks for rest"
+    above = classify(track(speed, class_name, share=enter), None, CALIBRATED)
+    assert (above.is_moving, above.reason) == (True, why)
+    assert classify(track(speed, class_name, share=0.99 * enter), None, CALIBRATED).reason is Reason.NEW
+
+
+@pytest.mark.parametrize(
+    ("class_name", "speed", "speaks_for_rest"),
+    [("chair", 0.0, True), ("chair", 0.5, False), ("person", 0.0, False), ("person", 0.5, False)],
+)
+def test_a_half_hidden_box_without_points_never_speaks_for_motion_and_for_rest_only_if_rigid_and_slow(
+    class_name, speed, speaks_for_rest
+) -> None:
+    moving = Verdict(is_moving=True, reason=Reason.SPEED, speed_m_s=1.0, mask_iou=None, calm_frames=1)
+    hidden = track(speed, class_name, sigma_v=1e-3, mask=SHAPES["waving"], is_partial=True)
+    asleep = classify(hidden, track(0.0, class_name, verdict=idle(7)), CALIBRATED)
+    assert (asleep.is_moving, asleep.reason, asleep.calm_frames) == (False, Reason.IDLE, 7 + speaks_for_rest)
+    assert asleep.mask_iou is None, "its outline is the occluder's"
+    awake = classify(hidden, track(1.0, class_name, verdict=moving), CALIBRATED)
+    assert (awake.is_moving, awake.reason, awake.calm_frames) == (True, Reason.SPEED, 1 + speaks_for_rest)
+    # Without an occluder the speed is proof, as it is where no surfaces are followed at all; points are, in any case.
+    fast = speed > 0
+    for now, profile in (
+        (replace(hidden, is_partial=False, mask=STANDING), CALIBRATED),
+        (replace(hidden, mask=STANDING), replace(CALIBRATED, surface=None)),
+    ):
+        verdict = classify(now, track(0.0, class_name, verdict=idle()), profile)
+        assert verdict.reason is (Reason.SPEED if fast else Reason.IDLE)
+    seen = classify(replace(hidden, surface=surface(1.0)), track(0.0, class_name, verdict=idle()), CALIBRATED)
+    assert seen.is_moving == (fast or class_name == "person")
 
 
 def test_a_surface_that_rests_calms_a_thing_whose_box_slides() -> None:
@@ -222,8 +304,8 @@ def test_a_person_whose_surface_rests_is_idle_after_the_calm_frames_and_moves_at
 
 @pytest.mark.parametrize(("policy", "is_masked"), [("mask", True), ("keep", False)])
 def test_the_policy_for_the_unknown_holds_until_something_is_known(policy, is_masked) -> None:
-    profile, before = replace(CALIBRATED, unknown_policy=policy), None
-    for k in range(CALIBRATED.calm_frames - 1):
+    profile, before = replace(CALIBRATED, unknown_policy=policy, proof_frames=4), None
+    for k in range(profile.proof_frames - 1):
         now = track(0.0, share=0.0)
         verdict = classify(now, before, profile)
         assert (verdict.is_moving, verdict.reason, verdict.calm_frames) == (is_masked, Reason.NEW, k + 1)

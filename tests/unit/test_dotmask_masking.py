@@ -50,7 +50,7 @@ def track(index=None, *, moving=True, misses=0, mask=LEFT, phase=None, position=
         mask=mask,
         mask_timestamp_s=0.0,
         mask_position_camera=np.array([0, 0, 2.0]),
-        partial_timestamp_s=-1.0,
+        is_partial=False,
         verdict=Verdict(is_moving=moving, reason=Reason.SPEED, speed_m_s=1.0, mask_iou=None),
     )
 

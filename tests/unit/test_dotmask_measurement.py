@@ -162,6 +162,19 @@ def test_a_side_is_hidden_if_most_of_it_ends_behind_something(reach) -> None:
     assert seen.is_partial == (reach > 0.5)
 
 
+@pytest.mark.parametrize(("columns", "other_m", "is_partial"), [(50, 1.5, True), (40, 1.5, False), (50, 2.6, False)])
+def test_an_object_that_another_nearer_detection_covers_more_than_it_shows_itself_is_partial(
+    columns, other_m, is_partial
+) -> None:
+    """Of 85 columns, the middle ones are another's: its sides are all to be seen."""
+    depth, whole = wall(8.0), rectangle(100, 40, 184, 175)
+    before = rectangle(120, 40, 119 + columns, 175)
+    depth[whole] = 2.5
+    depth[before] = other_m
+    seen = observe(detect(whole & ~before, before), frame(depth), CALIBRATED)[0]
+    assert seen.is_partial == is_partial
+
+
 def test_what_is_behind_hides_nothing() -> None:
     depth, mask = wall(8.0), rectangle(100, 40, 184, 175)
     depth[rectangle(60, 20, 230, 200)] = 2.7

@@ -20,7 +20,7 @@ def track_at(mean, covariance=None, class_name="chair", *, is_partial=False, pha
         mask=np.zeros((4, 4), bool),
         mask_timestamp_s=2.0,
         mask_position_camera=np.array([0, 0, 1.0]),
-        partial_timestamp_s=2.0 if is_partial else 1.0,
+        is_partial=is_partial,
         innovation=Innovation(residual=np.zeros(3), covariance=np.eye(3)),
         surface=SurfaceMotion(points=9, moving_share=0.5, velocity_world=np.ones(3), covariance=np.eye(3)),
     )
@@ -31,7 +31,7 @@ def test_prediction_moves_with_the_velocity_and_counts_a_miss() -> None:
     np.testing.assert_allclose(after.mean, [1.25, 1.5, 3.125, 0.5, -1, 0.25], rtol=0, atol=1e-15)
     assert (after.timestamp_s, after.hits, after.misses, after.detection_index) == (2.5, 4, 1, None)
     assert (after.innovation, after.surface) == (None, None), "they are of a frame, and this frame was not looked at"
-    assert (after.mask_timestamp_s, after.partial_timestamp_s) == (2.0, 1.0)
+    assert (after.mask_timestamp_s, after.is_partial) == (2.0, False)
 
 
 @pytest.mark.parametrize(
@@ -53,7 +53,7 @@ def test_the_measured_point_of_a_half_hidden_object_may_slide_over_it(class_name
     added = predict(hidden, 2.25, CALIBRATED).covariance - predict(whole, 2.25, CALIBRATED).covariance
     # sigma metres per root second: the position alone, so that the velocity is not dragged along.
     np.testing.assert_allclose(added, np.diag([sigma**2 * 0.25] * 3 + [0.0] * 3), rtol=0, atol=1e-15)
-    assert slide_variance(hidden, 2.25, CALIBRATED) == pytest.approx(sigma**2 * 0.25)
+    assert slide_variance(class_name, 0.25, CALIBRATED) == pytest.approx(sigma**2 * 0.25)
     np.testing.assert_array_equal(predict(hidden, 2.25, PAPER).covariance, predict(whole, 2.25, PAPER).covariance)
 
 
@@ -95,6 +95,15 @@ def test_misprint_b_cross_terms_must_scale_like_a_covariance() -> None:
     # One acceleration makes both errors, so they are fully correlated; the printed cross term denies it.
     assert metres[0, 3] / np.sqrt(metres[0, 0] * metres[3, 3]) == pytest.approx(1.0)
     assert printed[0] / np.sqrt(metres[0, 0] * metres[3, 3]) < 0.05
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_process_noise_is_gamma_sigma_gamma_transposed(seed) -> None:
+    rng = np.random.default_rng(seed)
+    dt, sigmas = rng.uniform(1e-3, 2.0), rng.uniform(0.01, 3.0, 3)
+    Gamma = np.vstack([0.5 * dt**2 * np.eye(3), dt * np.eye(3)])
+    expected = Gamma @ np.diag(sigmas**2) @ Gamma.T
+    np.testing.assert_allclose(process_noise(dt, sigmas), expected, rtol=1e-12, atol=0)
 
 
 def test_calibrated_objects_on_the_floor_hardly_accelerate_upwards() -> None:

@@ -42,6 +42,8 @@ def test_unknown_class_is_refused() -> None:
         ({"max_misses": 0}, "max_misses must be at least 1"),
         ({"gate_probability": 1.0}, "probabilities"),
         ({"confirming_hits": 0}, "confirming_hits must be at least 1"),
+        ({"proof_frames": 0}, "proof_frames must be at least 1"),
+        ({"calm_frames": 0}, "calm_frames must be at least 1"),
         ({"coasting_mask_frames": -1}, "not be negative"),
     ],
 )
@@ -64,5 +66,12 @@ def test_masks_do_not_shrink(name) -> None:
 def test_the_papers_profile_leaves_out_what_is_not_in_the_paper() -> None:
     assert PAPER.surface is None
     assert (PAPER.reappearance_m, PAPER.least_mask_likelihood, PAPER.coasting_mask_frames) == (0.0, 1.0, 0)
-    assert (PAPER.aligns_masks, PAPER.calm_frames, PAPER.speed_confidence) == (False, 1, 0.0)
+    assert (PAPER.aligns_masks, PAPER.speed_confidence) == (False, 0.0)
+    assert (PAPER.proof_frames, PAPER.calm_frames) == (1, 1)
     assert all(m.slide_sigma_m == 0 and m.shape_sigma_m == (0, 0, 0) for m in PAPER.classes)
+
+
+def test_to_become_moving_asks_for_no_less_of_a_surface_than_to_stay_so() -> None:
+    for model in CALIBRATED.classes:
+        assert 0 < model.still_moving_share < model.moving_share < 1
+    assert CALIBRATED.max_misses == 90, "three seconds at 30 Hz"

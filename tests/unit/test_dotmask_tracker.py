@@ -3,8 +3,10 @@ import pytest
 
 from dotmask.profiles import CALIBRATED, PAPER
 from dotmask.records import Intrinsics, Observation, SurfaceMotion, TrackPhase
+from dotmask.tracking.association import Association
 from dotmask.tracking.measurement_model import CAMERA_POINT
-from dotmask.tracking.tracker import TrackerState, track_objects
+from dotmask.tracking.motion_model import predict
+from dotmask.tracking.tracker import TrackerState, predict_tracks, update_tracks
 
 DT = 1 / 30
 CAMERA = Intrinsics(width=32, height=24, fx=26.0, fy=26.0, cx=15.5, cy=11.5)
@@ -32,7 +34,7 @@ def step(state, k, *objects, profile=PAPER, T_world_camera=None, is_partial=Fals
     observations = frame(*objects, is_partial=is_partial)
     pose = np.eye(4) if T_world_camera is None else T_world_camera
     surfaces = (None,) * len(objects) if surfaces is None else surfaces
-    return track_objects(state, observations, surfaces, k * dt, pose, CAMERA, profile)
+    return update_tracks(predict_tracks(state, k * dt, profile), observations, surfaces, pose, CAMERA, profile)
 
 
 def test_a_new_object_starts_a_track_and_the_next_frame_updates_it() -> None:
@@ -259,3 +261,40 @@ def test_the_search_for_what_came_out_elsewhere_ends_at_its_gate() -> None:
         if len(ids) == 2:
             # The lost one is no less certain for having been looked for.
             assert np.trace(state.tracks[0].covariance) < 0.1
+
+
+def test_tracks_are_predicted_once_and_may_be_updated_often() -> None:
+    """With another pose, say: the prediction is the motion model's, and an update leaves it as it was."""
+    state = TrackerState()
+    for k in range(5):
+        state = step(state, k, ([0.1 * k, 0, 2], "chair"), ([2, 0, 3], "person"))
+    predicted = predict_tracks(state, 5 * DT, PAPER)
+    assert (predicted.timestamp_s, predicted.next_track_id) == (5 * DT, 3)
+    assert predicted.elapsed_s == pytest.approx(DT)
+    for known, ahead in zip(state.tracks, predicted.tracks, strict=True):
+        expected = predict(known, 5 * DT, PAPER)
+        np.testing.assert_array_equal(ahead.mean, expected.mean)
+        np.testing.assert_array_equal(ahead.covariance, expected.covariance)
+        assert (ahead.misses, ahead.detection_index) == (1, None)
+    seen, pose = frame(([0.5, 0, 2], "chair"), ([9, 0, 2], "cup")), np.eye(4)
+    first = update_tracks(predicted, seen, (None,) * 2, pose, CAMERA, PAPER)
+    elsewhere = np.eye(4)
+    elsewhere[0, 3] = 0.05
+    update_tracks(predicted, seen, (None,) * 2, elsewhere, CAMERA, PAPER)
+    again = update_tracks(predicted, seen, (None,) * 2, pose, CAMERA, PAPER)
+    assert [t.track_id for t in again.tracks] == [1, 2, 3]
+    assert [t.misses for t in again.tracks] == [0, 1, 0]
+    for one, other in zip(first.tracks, again.tracks, strict=True):
+        np.testing.assert_array_equal(one.mean, other.mean)
+        np.testing.assert_array_equal(one.covariance, other.covariance)
+    assert predict_tracks(TrackerState(), 7.0, PAPER).elapsed_s == 0.0
+
+
+def test_how_pairs_are_found_can_be_replaced() -> None:
+    def crossed(tracks, observations, *_):
+        return Association(pairs=((0, 1), (1, 0)), unmatched_tracks=(), unmatched_observations=())
+
+    state = step(TrackerState(), 0, ([0, 0, 2], "chair"), ([1, 0, 2], "chair"))
+    seen = frame(([0, 0, 2], "chair"), ([1, 0, 2], "chair"))
+    after = update_tracks(predict_tracks(state, DT, PAPER), seen, (None,) * 2, np.eye(4), CAMERA, PAPER, crossed)
+    assert [t.detection_index for t in after.tracks] == [1, 0]

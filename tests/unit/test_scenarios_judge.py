@@ -71,7 +71,7 @@ def track(track_id: int, detection: int, name: str, mask: np.ndarray, time_s: fl
         mask=mask,
         mask_timestamp_s=time_s,
         mask_position_camera=np.array([0, 0, 2.8]),
-        partial_timestamp_s=time_s,
+        is_partial=False,
         innovation=Innovation(residual=np.array([1.0, 0, 0]), covariance=np.eye(3)),
         verdict=Verdict(is_moving=flag, reason=Reason.SPEED, speed_m_s=speed, mask_iou=None),
     )
