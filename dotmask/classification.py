@@ -49,8 +49,9 @@ def classify(track: Track, previous: Track | None, profile: Profile) -> Verdict:
         is_surface_fast = float(np.linalg.norm(surface.velocity_world)) > model.speed_threshold_m_s
         if model.is_non_rigid and is_shifted:
             reason = Reason.SURFACE  # a hand may move before the body does, without a change of the mask
-        elif is_fast and (is_shifted or is_surface_fast) and _is_significant(track, profile.speed_confidence):
-            reason = Reason.SPEED
+        elif is_fast and (is_shifted or is_surface_fast):
+            speaks_for_rest = False
+            reason = Reason.SPEED if _is_significant(track, profile.speed_confidence) else Reason.IDLE
     elif track.is_partial and profile.surface is not None:
         # The centre of the visible part slides over the object: its speed proves nothing.
         speaks_for_rest = not (is_fast or model.is_non_rigid)

@@ -23,7 +23,7 @@ _SCALE = 2
 """Points are followed in the image at half its size."""
 _WINDOW_PX, _LEVELS = 11, 3
 _FLOW_STOP = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 10, 0.03)
-_MOST_DIFFERENCE = 8.0
+_MOST_DIFFERENCE = 16.0
 """Mean difference in grey levels between the surroundings of a point then and now; more, and it was not found again."""
 _BORDER = np.ones((5, 5), np.uint8)
 """Points keep off a mask's border by two pixels of the half size image: there, the background moves with them."""
@@ -224,19 +224,34 @@ def _half_pixels(full: FloatArray) -> npt.NDArray[np.float32]:
 def _flow(
     before: SurfacePoints, grey: GreyImage, expected: npt.NDArray[np.float32]
 ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.bool_]]:
-    """Where the points are in `grey` (N, 2), searched from `expected` on, and whether each was found (N,)."""
-    pixels, found, difference = cv2.calcOpticalFlowPyrLK(
-        before.grey,
-        grey,
-        before.pixels,
-        np.where(np.isfinite(expected), expected, before.pixels),
+    """Where the points are in `grey` (N, 2), and whether each was found (N,).
+
+    A point is looked for where it would be at rest (`expected`) first, and through the pyramid only if it is not there:
+    the coarse levels would lead it into the next stripe of a shirt.
+    """
+    start = np.where(np.isfinite(expected), expected, before.pixels)
+    pixels, found = _searched(before.grey, grey, before.pixels, start, 0)
+    gone = np.flatnonzero(~found)
+    if len(gone):
+        pixels[gone], found[gone] = _searched(before.grey, grey, before.pixels[gone], start[gone], _LEVELS)
+    return pixels, found
+
+
+def _searched(
+    before: GreyImage, now: GreyImage, pixels: npt.NDArray[np.float32], start: npt.NDArray[np.float32], levels: int
+) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.bool_]]:
+    found_at, found, difference = cv2.calcOpticalFlowPyrLK(
+        before,
+        now,
+        pixels,
+        start.copy(),
         winSize=(_WINDOW_PX, _WINDOW_PX),
-        maxLevel=_LEVELS,
+        maxLevel=levels,
         criteria=_FLOW_STOP,
         flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
     )
     is_alike = np.asarray(difference)[:, 0] <= _MOST_DIFFERENCE
-    return np.asarray(pixels, np.float32), (np.asarray(found)[:, 0] == 1) & is_alike
+    return np.asarray(found_at, np.float32), (np.asarray(found)[:, 0] == 1) & is_alike
 
 
 def _inner_region(box_px: FloatArray, mask: npt.NDArray[np.bool_]) -> _Region:
