@@ -148,7 +148,7 @@ def slide(track: Track, variance_m2: float) -> Track:
 def _innovations(
     means: FloatArray, P: FloatArray, observations: Sequence[Observation], T_world_camera: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """y (N, 3), S (N, 3, 3) and H (N, 3, 6) of beliefs (N, 6) and (N, 6, 6), see `innovate`."""
+    """Residuals y (N, 3), S (N, 3, 3) and H (N, 3, 6) of beliefs (N, 6) and (N, 6, 6), see `innovate`."""
     model = observations[0].model  # one frame's observations are made alike
     p_seen = np.array([observation.position_camera for observation in observations])
     R = np.array([observation.covariance for observation in observations])

@@ -19,7 +19,7 @@ def transition(dt_s: float) -> FloatArray:
 
 
 def process_noise(dt_s: float, acceleration_sigmas_m_s2: FloatArray) -> FloatArray:
-    """Q (..., 6, 6) `= Γ Σ Γᵀ`, `Γ = [dt²/2 I; dt I]`: an acceleration that is constant over the frame, Σ its covariance.
+    """Q (..., 6, 6) `= Γ Σ Γᵀ`, `Γ = [dt²/2 I; dt I]`: an acceleration constant over the frame, Σ its covariance.
 
     The paper prints `dt² I` as Γ's lower block, and σ³ in the cross terms of the expanded Q; both are misprints (see
     dotmask.profiles.PAPER).
