@@ -19,17 +19,22 @@ class Cutout:
         mask: (H, W) bool.
         radius_px: by which it grows before.
         is_moving: whether it goes from the MO-MDI; all go from the MDI.
+        box_px: (4,) `u_min, v_min, u_max, v_max`, where the mask is looked for first; only the time depends on it.
     """
 
     mask: MaskImage
     radius_px: int
     is_moving: bool
+    box_px: FloatArray | None = None
 
 
 def all_cutouts(detections: Detections, profile: Profile) -> tuple[Cutout, ...]:
     """Every object of interest as if it moved."""
     radius_px = round(profile.growth.base_px)
-    return tuple(Cutout(mask=mask, radius_px=radius_px, is_moving=True) for mask in detections.masks)
+    return tuple(
+        Cutout(mask=mask, radius_px=radius_px, is_moving=True, box_px=box)
+        for mask, box in zip(detections.masks, detections.boxes_px, strict=True)
+    )
 
 
 def choose_cutouts(
@@ -65,7 +70,8 @@ def choose_cutouts(
             drift = track.velocity_world - camera_velocity_world
             p_camera = transform(T_camera_world, track.position_world)
             radius_px = growth_px(p_camera, T_camera_world[:3, :3] @ drift, intrinsics, profile.growth)
-        cutouts.append(Cutout(mask=mask, radius_px=radius_px, is_moving=is_moving))
+        box_px = detections.boxes_px[index]
+        cutouts.append(Cutout(mask=mask, radius_px=radius_px, is_moving=is_moving, box_px=box_px))
     for track in tracks:
         if track.phase is TrackPhase.COASTING and track.misses <= profile.coasting_mask_frames and _is_moving(track):
             p_camera = transform(T_camera_world, track.position_world)
@@ -100,9 +106,11 @@ def mask_depth(depth_m: DepthImage, cutouts: Sequence[Cutout]) -> MaskedDepth:
         depth_m: (H, W) float32 metres, 0 = none; stays as it is.
         cutouts: what is removed.
     """
-    mo_mdi = depth_m.copy()
+    # One block for both: memory that the system gives and takes back image by image costs more than the masking.
+    mo_mdi, mdi = np.empty((2, *depth_m.shape), np.float32)
+    np.copyto(mo_mdi, depth_m)
     _remove(mo_mdi, [cutout for cutout in cutouts if cutout.is_moving])
-    mdi = mo_mdi.copy()
+    np.copyto(mdi, mo_mdi)
     _remove(mdi, [cutout for cutout in cutouts if not cutout.is_moving])
     return MaskedDepth(mo_mdi_m=mo_mdi, mdi_m=mdi)
 
@@ -110,7 +118,7 @@ def mask_depth(depth_m: DepthImage, cutouts: Sequence[Cutout]) -> MaskedDepth:
 def _remove(depth_m: DepthImage, cutouts: Sequence[Cutout]) -> None:
     """Set `depth_m` to 0 under the grown masks, in place."""
     for cutout in cutouts:
-        region, patch = dilated_patch(cutout.mask, cutout.radius_px)
+        region, patch = dilated_patch(cutout.mask, cutout.radius_px, cutout.box_px)
         np.copyto(depth_m[region], 0.0, where=patch)
 
 

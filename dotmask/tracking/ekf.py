@@ -6,6 +6,7 @@ is the point itself. The paper prints the rotation from camera to world with the
 camera points into the world, and h needs the inverse.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,9 +20,9 @@ _VELOCITY = _IDENTITY[3:]
 
 
 def measurement_jacobian(p_camera: FloatArray, model: MeasurementModel, T_world_camera: FloatArray) -> FloatArray:
-    """H (3, 6) `= [m'(p_camera) R_camera_world, 0]`, at a point (3,) in the camera frame."""
-    H = np.zeros((3, 6))
-    H[:, :3] = model.jacobian(p_camera) @ T_world_camera[:3, :3].T
+    """H (..., 3, 6) `= [m'(p_camera) R_camera_world, 0]`, at points (..., 3) in the camera frame."""
+    H = np.zeros((*p_camera.shape, 6))
+    H[..., :3] = model.jacobian(p_camera) @ T_world_camera[:3, :3].T
     return H
 
 
@@ -65,17 +66,8 @@ def innovate(track: Track, observation: Observation, T_world_camera: FloatArray)
     h is taken as linear around the prediction; where that is so far off (behind the camera, or at less than half or
     more than twice the measured depth) that it is not, around the observation.
     """
-    model, p_seen = observation.model, observation.position_camera
-    p_camera = transform(inverse(T_world_camera), track.position_world)
-    p_linear = p_camera if 0.5 * p_seen[2] < p_camera[2] < 2.0 * p_seen[2] else p_seen
-    H = measurement_jacobian(p_linear, model, T_world_camera)
-    expected = model.measured(p_linear)
-    if p_linear is p_seen:
-        expected = expected + model.jacobian(p_seen) @ (p_camera - p_seen)
-    innovation = Innovation(
-        residual=model.measured(p_seen) - expected, covariance=H @ track.covariance @ H.T + observation.covariance
-    )
-    return innovation, H
+    residuals, S, H = _innovations(track.mean[None], track.covariance[None], [observation], T_world_camera)
+    return Innovation(residual=residuals[0], covariance=S[0]), H[0]
 
 
 def update(
@@ -97,30 +89,53 @@ def update(
         T_world_camera: (4, 4) camera pose at the frame.
         profile: says when a track is confirmed.
     """
-    innovation, H = innovate(track, observation, T_world_camera)
-    mean, P = _corrected(track.mean, track.covariance, innovation, H, observation.covariance)
-    if surface is not None:
-        residual, S = surface.velocity_world - mean[3:], P[3:, 3:] + surface.covariance
-        velocity = Innovation(residual=residual, covariance=S)
-        mean, P = _corrected(mean, P, velocity, _VELOCITY, surface.covariance)
-    hits = track.hits + 1
-    return replace(
-        track,
-        mean=mean,
-        covariance=P,
-        hits=hits,
-        misses=0,
-        phase=TrackPhase.CONFIRMED
-        if track.phase is not TrackPhase.TENTATIVE or hits >= profile.confirming_hits
-        else TrackPhase.TENTATIVE,
-        detection_index=observation.detection_index,
-        mask=observation.mask,
-        mask_timestamp_s=track.timestamp_s,
-        mask_position_camera=transform(inverse(T_world_camera), mean[:3]),
-        is_partial=observation.is_partial,
-        innovation=innovation,
-        surface=surface,
-    )
+    return update_all([track], [observation], [surface], T_world_camera, profile)[0]
+
+
+def update_all(
+    tracks: Sequence[Track],
+    observations: Sequence[Observation],
+    surfaces: Sequence[SurfaceMotion | None],
+    T_world_camera: FloatArray,
+    profile: Profile,
+) -> tuple[Track, ...]:
+    """`update` for all tracks of one frame in one go; observation and surface of each stand at its place."""
+    if not tracks:
+        return ()
+    means = np.array([track.mean for track in tracks])
+    P = np.array([track.covariance for track in tracks])
+    R = np.array([observation.covariance for observation in observations])
+    residuals, S, H = _innovations(means, P, observations, T_world_camera)
+    means, P = _corrected(means, P, residuals, S, H, R)
+    followed = [(i, surface) for i, surface in enumerate(surfaces) if surface is not None]
+    if followed:
+        at = [i for i, _ in followed]
+        R = np.array([surface.covariance for _, surface in followed])
+        residual = np.array([surface.velocity_world for _, surface in followed]) - means[at, 3:]
+        means[at], P[at] = _corrected(means[at], P[at], residual, P[at, 3:, 3:] + R, _VELOCITY, R)
+    positions_camera = transform(inverse(T_world_camera), means[:, :3])
+    updated = []
+    for i, (track, observation) in enumerate(zip(tracks, observations, strict=True)):
+        hits = track.hits + 1
+        is_confirmed = track.phase is not TrackPhase.TENTATIVE or hits >= profile.confirming_hits
+        updated.append(
+            replace(
+                track,
+                mean=means[i],
+                covariance=P[i],
+                hits=hits,
+                misses=0,
+                phase=TrackPhase.CONFIRMED if is_confirmed else TrackPhase.TENTATIVE,
+                detection_index=observation.detection_index,
+                mask=observation.mask,
+                mask_timestamp_s=track.timestamp_s,
+                mask_position_camera=positions_camera[i],
+                is_partial=observation.is_partial,
+                innovation=Innovation(residual=residuals[i], covariance=S[i]),
+                surface=surfaces[i],
+            )
+        )
+    return tuple(updated)
 
 
 def slide(track: Track, variance_m2: float) -> Track:
@@ -130,11 +145,27 @@ def slide(track: Track, variance_m2: float) -> Track:
     return replace(track, covariance=P)
 
 
+def _innovations(
+    means: FloatArray, P: FloatArray, observations: Sequence[Observation], T_world_camera: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Residuals y (N, 3), S (N, 3, 3) and H (N, 3, 6) of beliefs (N, 6) and (N, 6, 6), see `innovate`."""
+    model = observations[0].model  # one frame's observations are made alike
+    p_seen = np.array([observation.position_camera for observation in observations])
+    R = np.array([observation.covariance for observation in observations])
+    p_camera = transform(inverse(T_world_camera), means[:, :3])
+    depth, seen_depth = p_camera[:, 2:], p_seen[:, 2:]
+    p_linear = np.where((0.5 * seen_depth < depth) & (depth < 2.0 * seen_depth), p_camera, p_seen)
+    H = measurement_jacobian(p_linear, model, T_world_camera)
+    aside = (model.jacobian(p_linear) @ (p_camera - p_linear)[..., None])[..., 0]  # 0 at the prediction itself
+    residuals = model.measured(p_seen) - (model.measured(p_linear) + aside)
+    return residuals, H @ P @ H.swapaxes(1, 2) + R, H
+
+
 def _corrected(
-    mean: FloatArray, P: FloatArray, innovation: Innovation, H: FloatArray, R: FloatArray
+    means: FloatArray, P: FloatArray, residuals: FloatArray, S: FloatArray, H: FloatArray, R: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Mean (6,) and covariance (6, 6) after an innovation."""
-    K = np.linalg.solve(innovation.covariance, H @ P).T
+    """Means (N, 6) and covariances (N, 6, 6) after innovations `residuals`, S of measurements H with noise R."""
+    K = np.linalg.solve(S, H @ P).swapaxes(1, 2)
     rest = _IDENTITY - K @ H
-    covariance = rest @ P @ rest.T + K @ R @ K.T
-    return mean + K @ innovation.residual, 0.5 * (covariance + covariance.T)
+    covariances = rest @ P @ rest.swapaxes(1, 2) + K @ R @ K.swapaxes(1, 2)
+    return means + (K @ residuals[..., None])[..., 0], 0.5 * (covariances + covariances.swapaxes(1, 2))

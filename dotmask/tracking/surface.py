@@ -88,45 +88,44 @@ def follow(
     """
     grey = _half_size(frame.rgb)
     regions = [_inner_region(box, mask) for box, mask in zip(detections.boxes_px, detections.masks, strict=True)]
-    pixels = np.zeros((0, 2), np.float32)
-    past = np.zeros((0, settings.memory_frames, 3))
-    past_pixels = np.zeros((0, settings.memory_frames, 2), np.float32)
-    past_s = np.full(settings.memory_frames, np.nan)
-    owner, p_camera = np.zeros(0, np.intp), np.zeros((0, 3))
+    memory = settings.memory_frames
+    past_s = np.full(memory, np.nan)
+    pixels, owner, p_camera = np.zeros((0, 2), np.float32), np.zeros(0, np.intp), np.zeros((0, 3))
+    kept, world = np.zeros(0, np.intp), np.zeros((0, 3))
     if before is not None and T_world_camera_before is not None:
         past_s = np.concatenate([[before.timestamp_s], before.past_s[:-1]])
         if len(before.pixels):
             world = transform(T_world_camera_before, before.p_camera)
-            past = np.concatenate([world[:, None], before.past_world[:, :-1]], axis=1)
-            past_pixels = np.concatenate([before.pixels[:, None], before.past_pixels[:, :-1]], axis=1)
             expected = project(transform(inverse(T_world_camera), world), frame.intrinsics)
             pixels, found = _flow(before, grey, _half_pixels(expected))
-            owner = _owners(pixels, regions)
+            owner = _owners(pixels, regions, grey.shape)
             p_camera = _lift(pixels, frame.depth_m, frame.intrinsics)
             is_kept = found & (owner >= 0) & (p_camera[:, 2] > 0)
             is_kept &= np.abs(p_camera[:, 2] - before.p_camera[:, 2]) < _DEPTH_JUMP_M
-            pixels, past, owner, p_camera = pixels[is_kept], past[is_kept], owner[is_kept], p_camera[is_kept]
-            past_pixels = past_pixels[is_kept]
-    have = [pixels[owner == i] for i in range(len(regions))]
-    served = _served([len(points) for points in have], frame.index)
-    fresh = [
-        _corners(grey, region, points, settings.points) if i in served else points[:0]
-        for i, (region, points) in enumerate(zip(regions, have, strict=True))
-    ]
-    fresh_owner = np.repeat(np.arange(len(fresh)), [len(corners) for corners in fresh])
-    fresh_pixels = np.concatenate([np.zeros((0, 2), np.float32), *fresh])
-    fresh_camera = _lift(fresh_pixels, frame.depth_m, frame.intrinsics)
-    has_depth = fresh_camera[:, 2] > 0
+            kept = np.flatnonzero(is_kept)
+            pixels, owner, p_camera = pixels[kept], owner[kept], p_camera[kept]
+    counts = np.bincount(owner, minlength=len(regions)).tolist()
+    for index in _served(counts, frame.index):
+        fresh = _corners(grey, regions[index], pixels[owner == index], settings.points)
+        if len(fresh):
+            fresh_camera = _lift(fresh, frame.depth_m, frame.intrinsics)
+            has_depth = fresh_camera[:, 2] > 0
+            pixels = np.concatenate([pixels, fresh[has_depth]])
+            p_camera = np.concatenate([p_camera, fresh_camera[has_depth]])
+            owner = np.concatenate([owner, np.full(np.count_nonzero(has_depth), index)])
+    past_world = np.full((len(pixels), memory, 3), np.nan)
+    past_pixels = np.full((len(pixels), memory, 2), np.nan, np.float32)
+    if before is not None and len(kept):
+        past_world[: len(kept), 0], past_world[: len(kept), 1:] = world[kept], before.past_world[kept, :-1]
+        past_pixels[: len(kept), 0], past_pixels[: len(kept), 1:] = before.pixels[kept], before.past_pixels[kept, :-1]
     return SurfacePoints(
         timestamp_s=frame.timestamp_s,
         grey=grey,
-        pixels=np.concatenate([pixels, fresh_pixels[has_depth]]),
-        p_camera=np.concatenate([p_camera, fresh_camera[has_depth]]),
-        detection_index=np.concatenate([owner, fresh_owner[has_depth]]),
-        past_world=np.concatenate([past, np.full((int(has_depth.sum()), *past.shape[1:]), np.nan)]),
-        past_pixels=np.concatenate(
-            [past_pixels, np.full((int(has_depth.sum()), *past_pixels.shape[1:]), np.nan, np.float32)]
-        ),
+        pixels=pixels,
+        p_camera=p_camera,
+        detection_index=owner,
+        past_world=past_world,
+        past_pixels=past_pixels,
         past_s=past_s,
     )
 
@@ -161,38 +160,35 @@ def surface_motions(
     age, p_camera, past = age[known], points.p_camera[known], points.past_world[known]
     owner, rows = points.detection_index[known], np.arange(len(known))
     elapsed_s = points.timestamp_s - points.past_s
+    counts = np.bincount(owner, minlength=len(models))
 
     seen_px, past_px = _full_pixels(points.pixels[known]), _full_pixels(points.past_pixels[known])
     thresholds = np.array([model.speed_threshold_m_s for model in models])[owner]
-    is_moving = np.zeros(len(known), np.bool_)
-    for ago in (age - 1, (age - 1) // 2):
-        expected_px = project(transform(inverse(T_world_camera), past[rows, ago]), intrinsics)
-        left_px = np.linalg.norm(seen_px - expected_px, axis=1)
-        speeds = left_px * p_camera[:, 2] / intrinsics.fx / elapsed_s[ago]
-        way_px = np.linalg.norm(seen_px - past_px[rows, ago], axis=1)
-        sigma_px = settings.flow_sigma_px + settings.flow_sigma_share * way_px
-        is_moving |= ~(left_px <= settings.flow_sigmas * sigma_px) & (speeds > thresholds)
+    ago = np.stack([age - 1, (age - 1) // 2])  # (2, N), as all that follows from it
+    expected_px = project(transform(inverse(T_world_camera), past[rows, ago].reshape(-1, 3)), intrinsics)
+    left_px = _lengths(seen_px - expected_px.reshape(2, -1, 2))
+    speeds = left_px * p_camera[:, 2] / intrinsics.fx / elapsed_s[ago]
+    sigma_px = settings.flow_sigma_px + settings.flow_sigma_share * _lengths(seen_px - past_px[rows, ago])
+    is_moving = (~(left_px <= settings.flow_sigmas * sigma_px) & (speeds > thresholds)).any(axis=0)
+    moving = np.bincount(owner, is_moving, len(models))
 
     lag = np.minimum(age, max(1, int(np.count_nonzero(elapsed_s <= settings.velocity_s)))) - 1
-    T = T_world_camera
-    velocities = (transform(T, p_camera) - past[rows, lag]) / elapsed_s[lag, None] @ T[:3, :3]  # camera axes
-    for index, model in enumerate(models):
-        mine = np.flatnonzero(owner == index)
-        if len(mine) < settings.least_points:
-            continue
-        middle = np.median(velocities[mine], axis=0)
-        spread = 1.4826 * np.median(np.abs(velocities[mine] - middle), axis=0)
+    lags, lags_s = np.bincount(owner, lag, len(models)), np.bincount(owner, elapsed_s[lag], len(models))
+    R_world_camera = T_world_camera[:3, :3]
+    velocities = (transform(T_world_camera, p_camera) - past[rows, lag]) / elapsed_s[lag, None]
+    velocities = velocities @ R_world_camera  # camera axes
+    for index in map(int, np.flatnonzero(counts >= settings.least_points)):
+        count, mine = int(counts[index]), velocities[owner == index]
+        middle = _median(mine)
+        spread = 1.4826 * _median(np.abs(mine - middle))
         # 1.25: a median is less efficient than a mean. The frames between two samples of one point overlap.
-        mean_lag = 1.0 + float(lag[mine].mean())
-        sigma = 1.25 * spread * np.sqrt(mean_lag / len(mine))
-        base_s = float(elapsed_s[lag[mine]].mean())
-        floor = np.hypot(model.surface_sigma_m_s, noise.pose_position_sigma_m / base_s)
-        R_world_camera = T[:3, :3]
+        sigma = 1.25 * spread * np.sqrt((1.0 + lags[index] / count) / count)
+        floor = np.hypot(models[index].surface_sigma_m_s, noise.pose_position_sigma_m / (lags_s[index] / count))
         motions[index] = SurfaceMotion(
-            points=len(mine),
-            moving_share=float(is_moving[mine].mean()),
+            points=count,
+            moving_share=float(moving[index] / count),
             velocity_world=R_world_camera @ middle,
-            covariance=R_world_camera @ np.diag(sigma**2 + floor**2) @ R_world_camera.T,
+            covariance=(R_world_camera * (sigma**2 + floor**2)) @ R_world_camera.T,
         )
     return tuple(motions)
 
@@ -209,6 +205,17 @@ class _Region:
 def _half_size(rgb: ColourImage) -> GreyImage:
     size = (rgb.shape[1] // _SCALE, rgb.shape[0] // _SCALE)
     return np.asarray(cv2.resize(cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY), size, interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def _lengths(vectors: FloatArray) -> FloatArray:
+    """(...) of vectors (..., 2)."""
+    return np.hypot(vectors[..., 0], vectors[..., 1])
+
+
+def _median(values: FloatArray) -> FloatArray:
+    """(D,) of each column of values (N, D), N above 0; without the checks of np.median, which take most of its time."""
+    ordered = np.sort(values, axis=0)
+    return np.asarray(0.5 * (ordered[(len(ordered) - 1) // 2] + ordered[len(ordered) // 2]))
 
 
 def _full_pixels(half: npt.NDArray[np.float32]) -> FloatArray:
@@ -267,16 +274,16 @@ def _inner_region(box_px: FloatArray, mask: npt.NDArray[np.bool_]) -> _Region:
     return _Region(left, top, np.asarray(inside, np.uint8))
 
 
-def _owners(pixels: npt.NDArray[np.float32], regions: Sequence[_Region]) -> npt.NDArray[np.intp]:
-    """(N,) the region that each pixel lies in; -1 for none."""
-    owner = np.full(len(pixels), -1, np.intp)
-    u, v = np.rint(pixels).astype(np.intp).T
+def _owners(pixels: npt.NDArray[np.float32], regions: Sequence[_Region], size: tuple[int, ...]) -> npt.NDArray[np.intp]:
+    """(N,) the region that each pixel of an image of `size` (h, w) lies in, the last of several; -1 for none."""
+    owners = np.full(size, -1, np.int16)
     for index, region in enumerate(regions):
         height, width = region.inside.shape
-        x, y = u - region.left, v - region.top
-        near = np.flatnonzero((x >= 0) & (x < width) & (y >= 0) & (y < height))
-        owner[near[region.inside[y[near], x[near]] != 0]] = index
-    return owner
+        part = owners[region.top : region.top + height, region.left : region.left + width]
+        np.copyto(part, index, where=region.inside.view(np.bool_))
+    u, v = np.rint(pixels).astype(np.intp).T
+    is_in_image = (u >= 0) & (u < size[1]) & (v >= 0) & (v < size[0])
+    return np.where(is_in_image, owners.ravel().take(v * size[1] + u, mode="clip"), -1).astype(np.intp)
 
 
 def _served(counts: Sequence[int], frame_index: int) -> set[int]:
@@ -316,13 +323,13 @@ def _lift(pixels: npt.NDArray[np.float32], depth_m: DepthImage, intrinsics: Intr
     """
     full = _full_pixels(pixels)
     height, width = depth_m.shape
-    u = np.clip(np.rint(full[:, 0]).astype(np.intp), 1, width - 2)
-    v = np.clip(np.rint(full[:, 1]).astype(np.intp), 1, height - 2)
-    neighbours = (np.arange(-1, 2)[:, None] * width + np.arange(-1, 2)).ravel()
-    around = depth_m.ravel()[(v * width + u)[:, None] + neighbours].astype(np.float64)
-    centre = around[:, 4]
-    is_same = (around > 0) & (np.abs(around - centre[:, None]) < _DEPTH_STEP_M)
-    count = is_same.sum(axis=1)
+    u, v = np.rint(full).astype(np.intp).T
+    u, v = np.minimum(np.maximum(u, 1), width - 2), np.minimum(np.maximum(v, 1), height - 2)
+    neighbours = (np.arange(-1, 2)[:, None] * width + np.arange(-1, 2)).reshape(-1, 1)
+    around = depth_m.ravel().take(neighbours + (v * width + u)).astype(np.float64)
+    centre = around[4]
+    is_same = (around > 0) & (np.abs(around - centre) < _DEPTH_STEP_M)
+    count = np.count_nonzero(is_same, axis=0)
     is_steady = (count >= _LEAST_NEIGHBOURS) & (centre > 0)
-    z = np.where(is_steady, (around * is_same).sum(axis=1) / np.maximum(count, 1), 0.0)
+    z = np.where(is_steady, (around * is_same).sum(axis=0) / np.maximum(count, 1), 0.0)
     return back_project(full, z, intrinsics)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from dotmask.profiles import Profile
 from dotmask.records import FloatArray, Intrinsics, Observation, SurfaceMotion, Track, TrackPhase
 from dotmask.tracking.association import Associate, associate
-from dotmask.tracking.ekf import initiate, slide, update
-from dotmask.tracking.motion_model import predict, slide_variance
+from dotmask.tracking.ekf import initiate, slide, update_all
+from dotmask.tracking.motion_model import predict_all, slide_variance
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -47,7 +47,7 @@ def predict_tracks(state: TrackerState, timestamp_s: float, profile: Profile) ->
         ValueError: the frame is not later than the state.
     """
     return PredictedTracks(
-        tracks=tuple(predict(track, timestamp_s, profile) for track in state.tracks),
+        tracks=predict_all(state.tracks, timestamp_s, profile),
         timestamp_s=timestamp_s,
         elapsed_s=timestamp_s - state.tracks[0].timestamp_s if state.tracks else 0.0,
         next_track_id=state.next_track_id,
@@ -80,20 +80,26 @@ def update_tracks(
     """
     tracks = list(predicted.tracks)
     association = associate(tracks, observations, T_world_camera, intrinsics, profile)
+    priors = []
     for i, j in association.pairs:
-        track, observation = tracks[i], observations[j]
-        if observation.is_partial and not track.is_partial:
+        track = tracks[i]
+        if observations[j].is_partial and not track.is_partial:
             track = slide(track, slide_variance(track.class_name, predicted.elapsed_s, profile))
-        tracks[i] = update(track, observation, surfaces[observation.detection_index], T_world_camera, profile)
+        priors.append(track)
+    seen = [observations[j] for _, j in association.pairs]
+    updated = update_all(priors, seen, _surfaces_of(seen, surfaces), T_world_camera, profile)
+    for (i, _), track in zip(association.pairs, updated, strict=True):
+        tracks[i] = track
 
     newcomers = [observations[j] for j in association.unmatched_observations]
     if profile.reappearance_m > 0 and newcomers:
         lost = association.unmatched_tracks
         anywhere = [slide(tracks[i], profile.reappearance_m**2) for i in lost]
         second = associate(anywhere, newcomers, T_world_camera, intrinsics, profile)
-        for i, j in second.pairs:
-            surface = surfaces[newcomers[j].detection_index]
-            tracks[lost[i]] = update(anywhere[i], newcomers[j], surface, T_world_camera, profile)
+        priors, seen = [anywhere[i] for i, _ in second.pairs], [newcomers[j] for _, j in second.pairs]
+        updated = update_all(priors, seen, _surfaces_of(seen, surfaces), T_world_camera, profile)
+        for (i, _), track in zip(second.pairs, updated, strict=True):
+            tracks[lost[i]] = track
         newcomers = [newcomers[j] for j in second.unmatched_observations]
 
     births = [
@@ -102,6 +108,13 @@ def update_tracks(
     ]
     living = [track for track in tracks if track.misses < _patience(track, profile)]
     return TrackerState(tracks=(*living, *births), next_track_id=predicted.next_track_id + len(births))
+
+
+def _surfaces_of(
+    observations: Sequence[Observation], surfaces: Sequence[SurfaceMotion | None]
+) -> list[SurfaceMotion | None]:
+    """How the surface of each observed object moves, from those of all detections."""
+    return [surfaces[observation.detection_index] for observation in observations]
 
 
 def _patience(track: Track, profile: Profile) -> int:
