@@ -23,7 +23,7 @@ _SCALE = 2
 """Points are followed in the image at half its size."""
 _WINDOW_PX, _LEVELS = 11, 3
 _FLOW_STOP = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 10, 0.03)
-_MOST_DIFFERENCE = 16.0
+_MOST_DIFFERENCE = 8.0
 """Mean difference in grey levels between the surroundings of a point then and now; more, and it was not found again."""
 _BORDER = np.ones((5, 5), np.uint8)
 """Points keep off a mask's border by two pixels of the half size image: there, the background moves with them."""
