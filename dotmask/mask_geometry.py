@@ -9,9 +9,6 @@ import numpy.typing as npt
 from dotmask.geometry import project
 from dotmask.records import FloatArray, Intrinsics, MaskImage
 
-_WIDE_PX = 5
-"""From this radius on, OpenCV's dilation, which looks at every pixel of the disc, is the slower one."""
-
 
 def bounding_rectangle(mask: MaskImage, expected_px: FloatArray | None = None) -> tuple[int, int, int, int]:
     """Left, top, width, height (pixels) of a mask; all 0 for an empty one.
@@ -104,35 +101,7 @@ def dilated_patch(
     region = (rows, columns)
     if radius_px == 0:
         return region, mask[region]
-    pixels = mask.view(np.uint8)[region]
-    if radius_px < _WIDE_PX:
-        return region, cv2.dilate(pixels, _disc(radius_px)).view(np.bool_)
-    return region, _widely_dilated(pixels, radius_px)
-
-
-def _widely_dilated(pixels: npt.NDArray[np.uint8], radius_px: int) -> MaskImage:
-    """What `cv2.dilate` makes of `pixels` (h, w) and the same disc, in less time for a large one.
-
-    The image is one long integer with a bit for each pixel: a shift by one moves it to the right, a shift by `stride`
-    moves it down, and `radius_px` empty pixels or more between two rows keep them apart. Each row of the disc adds the
-    image, widened by that row's half width and moved up or down.
-    """
-    height, width = pixels.shape
-    stride = -(-(width + radius_px) // 8) * 8
-    spaced = np.zeros((height, stride), np.uint8)
-    spaced[:, :width] = pixels
-    image = widened = int.from_bytes(np.packbits(spaced).tobytes(), "big")
-    grown = half_width = 0
-    for row, wanted in enumerate(_disc(radius_px)[: radius_px + 1].sum(axis=1).tolist()):
-        while half_width < wanted // 2:
-            half_width += 1
-            widened |= image >> half_width | image << half_width
-        way = (radius_px - row) * stride
-        grown |= widened >> way | widened << way
-    size = height * stride // 8
-    inside = grown & ((1 << 8 * size) - 1)
-    bits = np.frombuffer(inside.to_bytes(size, "big"), np.uint8)
-    return np.unpackbits(bits).reshape(height, stride)[:, :width].view(np.bool_)
+    return region, cv2.dilate(mask.view(np.uint8)[region], _disc(radius_px)).view(np.bool_)
 
 
 @cache
