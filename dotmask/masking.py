@@ -60,25 +60,30 @@ def choose_cutouts(
         profile: growth of the masks, and for how long unseen tracks are removed.
     """
     T_camera_world = inverse(T_world_camera)
+
+    def radius_px(track: Track | None) -> int:
+        if track is None:
+            return round(profile.growth.base_px)
+        velocity_camera = T_camera_world[:3, :3] @ (track.velocity_world - camera_velocity_world)
+        return growth_px(transform(T_camera_world, track.position_world), velocity_camera, intrinsics, profile.growth)
+
     seen = {track.detection_index: track for track in tracks if track.detection_index is not None}
     cutouts = []
     for index, mask in enumerate(detections.masks):
         track = seen.get(index)
-        is_moving = track is None or _is_moving(track)
-        radius_px = round(profile.growth.base_px)
-        if track is not None:
-            drift = track.velocity_world - camera_velocity_world
-            p_camera = transform(T_camera_world, track.position_world)
-            radius_px = growth_px(p_camera, T_camera_world[:3, :3] @ drift, intrinsics, profile.growth)
-        box_px = detections.boxes_px[index]
-        cutouts.append(Cutout(mask=mask, radius_px=radius_px, is_moving=is_moving, box_px=box_px))
+        cutouts.append(
+            Cutout(
+                mask=mask,
+                radius_px=radius_px(track),
+                is_moving=track is None or _is_moving(track),
+                box_px=detections.boxes_px[index],
+            )
+        )
     for track in tracks:
         if track.phase is TrackPhase.COASTING and track.misses <= profile.coasting_mask_frames and _is_moving(track):
             p_camera = transform(T_camera_world, track.position_world)
             mask = moved_mask(track.mask, track.mask_position_camera, p_camera, intrinsics)
-            drift = T_camera_world[:3, :3] @ (track.velocity_world - camera_velocity_world)
-            radius_px = growth_px(p_camera, drift, intrinsics, profile.growth)
-            cutouts.append(Cutout(mask=mask, radius_px=radius_px, is_moving=True))
+            cutouts.append(Cutout(mask=mask, radius_px=radius_px(track), is_moving=True))
     return tuple(cutouts)
 
 

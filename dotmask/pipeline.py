@@ -1,6 +1,6 @@
 """The paper's architecture figure on one page: segment, track, classify, mask, and close the loop with SLAM.
 
-    frame ----> segment --> observe --> predict, associate, update --> classify --> mask ---> MO-MDI, MDI
+    frame --> segment --> observe, follow --> predict, associate, update --> classify --> mask --> MO-MDI, MDI
                                               ^                                                   |
                                               |   predicted camera pose                           v
                                               '------------- pose feedback <----------- SLAM: odometry, map

@@ -1,6 +1,16 @@
 """One person who fills the view, two who hide each other, six who do both."""
 
-from scenarios.spec import CameraSpec, PeopleSpec, PersonSpec, Scenario, StandAct, WalkLoopAct
+from scenarios.spec import (
+    CameraSpec,
+    PeopleSpec,
+    PersonSpec,
+    Scenario,
+    SitAct,
+    StandAct,
+    ThingSpec,
+    WalkAct,
+    WalkLoopAct,
+)
 
 NEAR_LOOP = ((-1.0, -1.42), (1.0, -1.42), (1.0, -0.4), (-1.0, -0.4))
 """Past the camera to the right, and back behind the low shelf."""
@@ -44,6 +54,41 @@ CROWD = Scenario(
     ),
 )
 
+STILL = 0.2
+"""Amplitude of small movements of a person who counts as at rest."""
+PAUSE = StandAct(duration_s=1.8, amplitude=STILL)
+WAYS = ((0.5, 0.0), (-0.8, 0.1), (0.4, -0.1), (-0.9, 0.0), (0.5, 0.0))
+
+STOP_AND_GO = Scenario(
+    name="stop_and_go",
+    description="A person stands, sets off, and stands again, five times; another one sits still.",
+    tags=("walking", "idle"),
+    frames=600,
+    camera=CameraSpec(position_m=(0.0, -2.5, 1.4), amplitude=0.5),
+    people=PeopleSpec(
+        cast=(
+            PersonSpec(
+                name="anton",
+                character="man",
+                outfit="plaid",
+                position_m=(-0.9, 0.0),
+                acts=(
+                    *(act for way_m in WAYS for act in (PAUSE, WalkAct(waypoints_m=(way_m,), speed_m_s=1.0))),
+                    StandAct(duration_s=3600.0, amplitude=STILL),
+                ),
+            ),
+            PersonSpec(
+                name="berta",
+                character="woman",
+                outfit="stripes",
+                seated_on="chair",
+                acts=(SitAct(duration_s=3600.0, amplitude=0.0),),
+            ),
+        )
+    ),
+    things=(ThingSpec(name="chair", kind="chair", look="blue", position_m=(1.35, 0.55, 0.0), heading_deg=-115),),
+)
+
 SCENARIOS = (
     Scenario(
         name="plaid_idle",
@@ -67,4 +112,5 @@ SCENARIOS = (
         ),
     ),
     CROWD,
+    STOP_AND_GO,
 )

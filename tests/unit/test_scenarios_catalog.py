@@ -17,7 +17,7 @@ from sim.scene import Frozen
 
 ASKED_FOR = {
     *BENCHMARK, "smoke", "robot_follows_person", "robot_corridor", "plaid_idle", "crossing", "crowd", "tilted",
-    "unknown_mover", "low_texture", "pushed_chair", "falling_bottle", "carried_cup", "detection_order",
+    "stop_and_go", "unknown_mover", "low_texture", "pushed_chair", "falling_bottle", "carried_cup", "detection_order",
     "ageless_track", "fixed_time_step", "wide_covariance", "new_mover", "approaching_person",
     "fault_missed", "fault_missed_bursts", "fault_false_positives", "fault_late_masks", "fault_eroded_masks",
     "fault_dilated_masks", "fault_split", "fault_merged", "fault_identity_shuffle", "fault_class_flips",
