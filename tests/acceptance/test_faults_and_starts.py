@@ -47,20 +47,24 @@ def walks(tmp_path_factory: pytest.TempPathFactory) -> dict[str, MethodReport]:
     return {name: judge.report() for name, judge in judges.items()}
 
 
+@pytest.mark.slow
 def test_thirty_percent_of_missing_detections_hardly_move_the_trajectory(walks: dict[str, MethodReport]) -> None:
     assert walks["missing"].ate_rmse_m < 1.5 * walks["whole"].ate_rmse_m
 
 
+@pytest.mark.slow
 def test_without_coasting_masks_the_same_misses_let_people_into_odometry(walks: dict[str, MethodReport]) -> None:
     assert walks["not coasting"].masks.leak > 5 * walks["missing"].masks.leak
     assert walks["not coasting"].rpe_trans_rmse_m > 2 * walks["missing"].rpe_trans_rmse_m
 
 
+@pytest.mark.slow
 def test_perfect_masks_hide_what_moves_and_little_else(walks: dict[str, MethodReport]) -> None:
     assert walks["whole"].masks.leak <= 0.005
     assert walks["whole"].masks.waste <= 0.03
 
 
+@pytest.mark.slow
 def test_the_position_follows_the_ideal_observation(walks: dict[str, MethodReport]) -> None:
     assert walks["whole"].ekf.position_rmse_ideal_m <= 0.03
 
