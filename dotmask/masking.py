@@ -111,7 +111,7 @@ def mask_depth(depth_m: DepthImage, cutouts: Sequence[Cutout]) -> MaskedDepth:
         depth_m: (H, W) float32 metres, 0 = none; stays as it is.
         cutouts: what is removed.
     """
-    # One block for both: memory that the system gives and takes back image by image costs more than the masking.
+    # One block for both: the system gives and takes back memory once, and not image by image.
     mo_mdi, mdi = np.empty((2, *depth_m.shape), np.float32)
     np.copyto(mo_mdi, depth_m)
     _remove(mo_mdi, [cutout for cutout in cutouts if cutout.is_moving])

@@ -362,8 +362,8 @@ CALIBRATED = Profile(
     coasting_mask_frames=10,
     pose_feedback="refined",
 )
-"""Our best: R absorbs the wobble of walking people and the jumps of half hidden boxes, speed is tested against its own
-uncertainty, and what is new is masked until it is known to be idle."""
+"""Our best: points on the surfaces measure velocity and tell what moves, speed is tested against its own uncertainty,
+the position of a half hidden object follows what is seen, and what is new is masked until it is known to be idle."""
 
 
 def _original_other(name: str) -> ClassModel:
