@@ -2,7 +2,7 @@
 
 from typing import Protocol
 
-from dotmask.records import Detections, MaskedDepth, PoseEstimate, RgbdFrame
+from dotmask.records import Detections, MaskedDepth, PoseEstimate, RgbdFrame, SlamResult
 
 
 class Segmenter(Protocol):
@@ -14,12 +14,19 @@ class Segmenter(Protocol):
 
 
 class SlamBackend(Protocol):
-    """Follows the camera through a sequence of frames."""
+    """Follows the camera through a sequence of frames and maps where it went."""
 
     def track(self, frame: RgbdFrame, masked: MaskedDepth) -> PoseEstimate:
-        """Pose of the camera at `frame`.
+        """Odometry: the pose of the camera at `frame`, from features where `masked.mo_mdi_m` is not 0.
 
-        Features for odometry come from where `masked.mo_mdi_m` is not 0, the map and its keyframes from
-        `masked.mdi_m`. Frames must be given in the order of time.
+        Frames must be given in the order of time.
         """
+        ...
+
+    def update_map(self, frame: RgbdFrame, masked: MaskedDepth) -> None:
+        """Mapping and loop closure, from features where `masked.mdi_m` is not 0; called after `track` of this frame."""
+        ...
+
+    def finish(self) -> SlamResult:
+        """The optimised trajectory and the loops; called once, after the last frame."""
         ...

@@ -28,6 +28,7 @@ from dotmask.records import (
     Observation,
     PoseEstimate,
     RgbdFrame,
+    SlamResult,
     SurfaceMotion,
     Track,
     checked_pose,
@@ -281,7 +282,7 @@ class FrameResult:
         T_world_camera_predicted: (4, 4) the pose that the tracker was given.
         front_end: see FrontEndResult.
         pose: what SLAM answered.
-        stage_seconds: CPU time of the calling thread by stage (segment, track, classify, mask, odometry).
+        stage_seconds: CPU time of the calling thread by stage (segment, track, classify, mask, odometry, map).
     """
 
     frame: RgbdFrame
@@ -320,6 +321,8 @@ class ClosedLoop:
         clock = StageClock()
         with clock("odometry"):
             pose = self._slam.track(frame, front_end.masked)
+        with clock("map"):
+            self._slam.update_map(frame, front_end.masked)
         if pose.T_world_camera is not None:
             if self._pose_feedback == "refined":
                 front_end = self._front_end.refine(pose.T_world_camera)
@@ -331,6 +334,10 @@ class ClosedLoop:
             pose=pose,
             stage_seconds={**front_end.stage_seconds, **clock.seconds},
         )
+
+    def finish(self) -> SlamResult:
+        """What SLAM knows after the last frame."""
+        return self._slam.finish()
 
     def _predict_pose(self, timestamp_s: float) -> FloatArray:
         if not self._poses:

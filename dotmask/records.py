@@ -394,6 +394,7 @@ class SlamStatus(Enum):
     INITIALISING = "initialising"
     TRACKED = "tracked"
     LOST = "lost"
+    RELOCALISED = "relocalised"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -405,12 +406,15 @@ class PoseEstimate:
         T_world_camera: (4, 4) the estimated pose, or None when lost: no pose is ever made up.
         status: see SlamStatus.
         inliers: features that agree with the pose.
+        covariance: (6, 6) of the pose's error as a twist in the camera's frame (rotation in radians, then translation
+            in metres: `T_true = T_estimated exp(twist)`), or None when the back end does not tell.
     """
 
     timestamp_s: float
     T_world_camera: FloatArray | None
     status: SlamStatus
     inliers: int
+    covariance: FloatArray | None = None
 
     def __post_init__(self) -> None:
         """Check that there is a pose unless lost."""
@@ -418,6 +422,9 @@ class PoseEstimate:
             raise ValueError("a pose estimate has a pose exactly when it is not lost")
         if self.T_world_camera is not None:
             object.__setattr__(self, "T_world_camera", checked_pose(self.T_world_camera, "T_world_camera"))
+        if self.covariance is not None:
+            object.__setattr__(self, "covariance", checked(self.covariance, "covariance", (6, 6), np.float64))
+            check_finite(self.covariance, "covariance")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -446,3 +453,48 @@ class Trajectory:
     def __len__(self) -> int:
         """The number of poses."""
         return len(self.timestamps_s)
+
+
+class LoopKind(Enum):
+    """How a loop was found."""
+
+    GLOBAL = "global"
+    """By what the place looks like, from anywhere."""
+    PROXIMITY = "proximity"
+    """By poses that say that the camera is near."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LoopClosure:
+    """Two frames that were found to show the same place, and that the optimised map was tied together by.
+
+    Attributes:
+        from_index: index of the later frame.
+        to_index: index of the earlier frame.
+        T_from_to: (4, 4) the measured relative pose.
+        kind: see LoopKind.
+    """
+
+    from_index: int
+    to_index: int
+    T_from_to: FloatArray
+    kind: LoopKind
+
+    def __post_init__(self) -> None:
+        """Check the order and the pose."""
+        if not self.from_index > self.to_index >= 0:
+            raise ValueError(f"a loop closure leads back in time: from {self.from_index} to {self.to_index}")
+        object.__setattr__(self, "T_from_to", checked_pose(self.T_from_to, "T_from_to"))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SlamResult:
+    """What a SLAM back end knows when all frames were seen.
+
+    Attributes:
+        trajectory: the optimised poses, of every frame that has one.
+        loops: the accepted loop closures in the order of their discovery.
+    """
+
+    trajectory: Trajectory
+    loops: tuple[LoopClosure, ...]

@@ -20,7 +20,7 @@ frames = int(sys.argv[1]) if len(sys.argv) > 1 else 60
 simulator = build_simulator(scenario("smoke"), "numba", threads=2)
 oracle = OracleSegmenter()  # put your own segmenter here: an object with segment(frame) -> Detections
 start = simulator.frame(0).truth.T_world_camera
-slam = EmbeddedSlam(intrinsics_from_camera(simulator.camera), start)  # or your own SLAM: track(frame, masked) -> pose
+slam = EmbeddedSlam(intrinsics_from_camera(simulator.camera), start)  # or your own: see dotmask.interfaces.SlamBackend
 loop = ClosedLoop(DotMask(oracle, profile("calibrated")), slam, "refined", start)
 
 for index in range(frames):

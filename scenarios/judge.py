@@ -10,15 +10,17 @@ from dotmask.evaluation.classification import ClassificationRecord, confusion, r
 from dotmask.evaluation.filter import BeliefSample, filter_errors, innovation_whiteness
 from dotmask.evaluation.identities import FrameIdentities, clear_scores, hota_scores, idf1
 from dotmask.evaluation.latency import latency_scores
+from dotmask.evaluation.loops import loop_errors
 from dotmask.evaluation.masks import MaskCounts, count_masking, count_outlines, count_overlap
 from dotmask.evaluation.matching import mask_ious, match_detections
 from dotmask.evaluation.trajectory import absolute_trajectory_error, relative_pose_error
 from dotmask.pipeline import FrameResult
-from dotmask.records import Detections, FloatArray, Track, Trajectory
+from dotmask.records import Detections, FloatArray, SlamResult, Track, Trajectory
 from scenarios.oracle import CLASSES, MIN_PIXELS
 from scenarios.report import (
     ConfusionReport,
     EkfReport,
+    LoopReport,
     MaskReport,
     MethodReport,
     MocReport,
@@ -55,6 +57,7 @@ class Judge:
     def __init__(self, method: str) -> None:
         self._method = method
         self._truth: list[tuple[float, FloatArray]] = []
+        self._true_pose_by_frame: dict[int, FloatArray] = {}
         self._estimate: list[tuple[float, FloatArray]] = []
         self._seconds: dict[str, list[float]] = defaultdict(list)
         self._beliefs: list[BeliefSample] = []
@@ -66,6 +69,7 @@ class Judge:
         """Score one frame and append its rows to `frames.csv` and `tracks.csv`."""
         frame, pose = result.frame, result.pose.T_world_camera
         self._truth.append((frame.timestamp_s, truth.T_world_camera))
+        self._true_pose_by_frame[frame.index] = truth.T_world_camera
         if pose is not None:
             self._estimate.append((frame.timestamp_s, pose))
         for stage, seconds in result.stage_seconds.items():
@@ -153,16 +157,20 @@ class Judge:
         """The poses that SLAM gave; frames in which it was lost are missing."""
         return _trajectory(self._estimate)
 
-    def report(self) -> MethodReport:
-        """All figures."""
+    def report(self, slam: SlamResult | None = None) -> MethodReport:
+        """All figures; those of the optimised map only with `slam`, what SLAM knew after the last frame."""
         truth, estimate = self.truth_trajectory(), self.estimated_trajectory()
         ate = absolute_trajectory_error(truth, estimate)
         rpe = relative_pose_error(truth, estimate)
+        optimised = None if slam is None else absolute_trajectory_error(truth, slam.trajectory)
         return MethodReport(
             ate_rmse_m=None if ate is None else ate.rmse_m,
             rpe_trans_rmse_m=None if rpe is None else rpe.trans_rmse_m,
             rpe_rot_rmse_rad=None if rpe is None else rpe.rot_rmse_rad,
             tracked_frames=len(estimate),
+            ate_optimised_rmse_m=None if optimised is None else optimised.rmse_m,
+            optimised_frames=None if slam is None else len(slam.trajectory),
+            loops=LoopReport() if slam is None else self._loop_report(slam),
             ekf=self._ekf_report(),
             tracking=self._tracking_report(),
             moc=self._moc_report(),
@@ -174,6 +182,10 @@ class Judge:
             ),
             time_ms=StageTimes(**{stage: 1e3 * float(np.mean(s)) for stage, s in self._seconds.items()}),
         )
+
+    def _loop_report(self, slam: SlamResult) -> LoopReport:
+        errors = loop_errors(slam.loops, self._true_pose_by_frame)
+        return LoopReport(count=0, false_count=0) if errors is None else LoopReport(**asdict(errors))
 
     def _ekf_report(self) -> EkfReport:
         figures = asdict(filter_errors(self._beliefs))

@@ -23,10 +23,20 @@ class Part(BaseModel):
 
 
 class LoopReport(Part):
-    """Loop closures: their number and the mean error of the relative poses they claim."""
+    """Loop closures, and the errors of the relative poses they claim.
+
+    Attributes:
+        count: accepted loop closures.
+        false_count: those of them whose translation is more than 0.1 m wrong.
+        trans_error_m: mean error of the translation.
+        trans_error_max_m: the largest of them.
+        rot_error_rad: mean error of the rotation.
+    """
 
     count: int | None = None
+    false_count: int | None = None
     trans_error_m: Measured = None
+    trans_error_max_m: Measured = None
     rot_error_rad: Measured = None
 
 
@@ -169,12 +179,30 @@ class StageTimes(Part):
 
 
 class MethodReport(Part):
-    """All figures of one method."""
+    """All figures of one method.
+
+    Attributes:
+        ate_rmse_m: of odometry: the poses as they were fed back to the tracker.
+        rpe_trans_rmse_m: of odometry, per frame.
+        rpe_rot_rmse_rad: of odometry, per frame.
+        tracked_frames: frames with a pose by odometry; an ATE says nothing without the number of poses it covers.
+        ate_optimised_rmse_m: after the last frame, with the loops closed.
+        optimised_frames: poses that it covers.
+        loops: see LoopReport.
+        ekf: see EkfReport.
+        tracking: see TrackingReport.
+        moc: see MocReport.
+        masks: see MaskReport.
+        map: see MapReport.
+        time_ms: see StageTimes.
+    """
 
     ate_rmse_m: Measured
     rpe_trans_rmse_m: Measured
     rpe_rot_rmse_rad: Measured
     tracked_frames: int
+    ate_optimised_rmse_m: Measured = None
+    optimised_frames: int | None = None
     loops: LoopReport = LoopReport()
     ekf: EkfReport = EkfReport()
     tracking: TrackingReport = TrackingReport()

@@ -198,6 +198,7 @@ def run(scenario: Scenario, settings: RunSettings, out: Path, advance: Callable[
             advance()
         if video is not None:
             video.close()
+        slam_results = {name: loop.finish() for name, loop in loops.items()}
         report = Report(
             scenario=scenario.name,
             seed=scenario.seed,
@@ -207,12 +208,13 @@ def run(scenario: Scenario, settings: RunSettings, out: Path, advance: Callable[
             slam=settings.slam,
             profile=settings.profile,
             frame_hash=digest.hexdigest(),
-            methods={name: judge.report() for name, judge in judges.items()},
+            methods={name: judge.report(slam_results[name]) for name, judge in judges.items()},
             time_ms=WorldTimes(render=1e3 * render_seconds / len(simulator)),
         )
         folder.write("trajectory_truth.txt", format_trajectory(judges[settings.methods[0]].truth_trajectory()))
         for name, judge in judges.items():
             folder.write(f"trajectory_{name}.txt", format_trajectory(judge.estimated_trajectory()))
+            folder.write(f"trajectory_{name}_optimised.txt", format_trajectory(slam_results[name].trajectory))
         write_picture(folder.path / "trajectories.png", paths.draw())
         folder.write("versions.json", json.dumps(versions(), indent=2) + "\n")
         folder.write("report.json", report.to_json())

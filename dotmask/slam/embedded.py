@@ -1,5 +1,7 @@
 """The embedded SLAM back end: RGB-D odometry and keyframes on OpenCV and NumPy."""
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 
@@ -9,16 +11,27 @@ from dotmask.records import (
     MaskedDepth,
     PoseEstimate,
     RgbdFrame,
+    SlamResult,
     SlamStatus,
+    Trajectory,
     check_finite,
     checked,
 )
-from dotmask.slam.features import FeatureExtractor
+from dotmask.slam.features import FeatureExtractor, Features, GreyImage
 from dotmask.slam.keyframes import Keyframe, KeyframeStore
 from dotmask.slam.odometry import Odometry
 from dotmask.slam.settings import OdometrySettings
 
 _DEFAULT_SETTINGS = OdometrySettings()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Seen:
+    """What odometry found in the last frame; mapping goes on from it."""
+
+    grey: GreyImage
+    features: Features
+    T_world_camera: FloatArray
 
 
 class EmbeddedSlam:
@@ -50,6 +63,8 @@ class EmbeddedSlam:
         self._store = KeyframeStore(intrinsics, settings)
         self._started = False
         self._last_time_s: float | None = None
+        self._seen: _Seen | None = None
+        self._poses: list[tuple[float, FloatArray]] = []
 
     @property
     def keyframes(self) -> tuple[Keyframe, ...]:
@@ -76,18 +91,36 @@ class EmbeddedSlam:
             self._started = len(features) >= self._settings.min_inliers
             result = self._odometry.start(features, frame.timestamp_s) if self._started else None
             status = SlamStatus.INITIALISING
+        self._seen = None
         if result is None:
             return PoseEstimate(timestamp_s=frame.timestamp_s, T_world_camera=None, status=SlamStatus.LOST, inliers=0)
-        if self._store.is_due(result.T_world_camera):
-            # Where both depths are masked alike, odometry has found the corners already.
-            if not np.array_equal(masked.mdi_m, masked.mo_mdi_m):
-                features = self._extractor.extract(grey, masked.mdi_m)
-            self._store.add(frame.index, frame.timestamp_s, result.T_world_camera, features)
+        self._seen = _Seen(grey=grey, features=features, T_world_camera=result.T_world_camera)
+        self._poses.append((frame.timestamp_s, result.T_world_camera))
         return PoseEstimate(
             timestamp_s=frame.timestamp_s,
             T_world_camera=result.T_world_camera,
             status=status,
             inliers=result.inliers,
+        )
+
+    def update_map(self, frame: RgbdFrame, masked: MaskedDepth) -> None:
+        """Keep the frame as a keyframe when the camera has moved enough; nothing happens while lost."""
+        seen = self._seen
+        if seen is None or not self._store.is_due(seen.T_world_camera):
+            return
+        # Where both depths are masked alike, odometry has found the corners already.
+        same = np.array_equal(masked.mdi_m, masked.mo_mdi_m)
+        features = seen.features if same else self._extractor.extract(seen.grey, masked.mdi_m)
+        self._store.add(frame.index, frame.timestamp_s, seen.T_world_camera, features)
+
+    def finish(self) -> SlamResult:
+        """The poses of all frames that were not lost."""
+        return SlamResult(
+            trajectory=Trajectory(
+                timestamps_s=np.array([t for t, _ in self._poses], np.float64),
+                T_world_camera=np.array([p for _, p in self._poses], np.float64).reshape(-1, 4, 4),
+            ),
+            loops=(),
         )
 
     def _check(self, frame: RgbdFrame, masked: MaskedDepth) -> None:

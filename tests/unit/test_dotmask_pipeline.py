@@ -20,6 +20,7 @@ from dotmask.records import (
     PoseEstimate,
     Reason,
     RgbdFrame,
+    SlamResult,
     SlamStatus,
     TrackPhase,
     Verdict,
@@ -64,12 +65,19 @@ class PlaybackSlam:
 
     def __init__(self, poses: Sequence[FloatArray | None]) -> None:
         self.poses, self.seen = poses, []
+        self.mapped: tuple[int, ...] = ()
 
     def track(self, frame: RgbdFrame, masked: MaskedDepth) -> PoseEstimate:
         self.seen.append(masked)
         pose = self.poses[frame.index]
         status = SlamStatus.LOST if pose is None else SlamStatus.TRACKED
         return PoseEstimate(timestamp_s=frame.timestamp_s, T_world_camera=pose, status=status, inliers=0)
+
+    def update_map(self, frame: RgbdFrame, masked: MaskedDepth) -> None:
+        self.mapped = (*self.mapped, frame.index)
+
+    def finish(self) -> SlamResult:
+        raise NotImplementedError
 
 
 def at(x_m: float) -> FloatArray:
@@ -165,7 +173,7 @@ def test_extrapolation_keeps_a_straight_path_and_a_steady_turn() -> None:
 
 def test_stages_are_timed() -> None:
     result = loop(DotMask(BoxSegmenter(0.0), profile("paper")), [np.eye(4)]).step(frame_at(0, 0.0))
-    assert set(result.stage_seconds) == {"segment", "track", "classify", "mask", "odometry"}
+    assert set(result.stage_seconds) == {"segment", "track", "classify", "mask", "odometry", "map"}
 
 
 TEXTURE = cv2.GaussianBlur(np.random.default_rng(4).integers(0, 256, (50, 30), np.uint8), (0, 0), 1.2)

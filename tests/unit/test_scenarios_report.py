@@ -67,8 +67,8 @@ def test_report_json_follows_the_contract() -> None:
     assert tree["time_ms"] == {"render": 20.0}
     dotmask = tree["methods"]["dotmask"]
     assert list(dotmask) == [
-        "ate_rmse_m", "rpe_trans_rmse_m", "rpe_rot_rmse_rad", "tracked_frames", "loops", "ekf", "tracking", "moc",
-        "masks", "map", "time_ms",
+        "ate_rmse_m", "rpe_trans_rmse_m", "rpe_rot_rmse_rad", "tracked_frames", "ate_optimised_rmse_m",
+        "optimised_frames", "loops", "ekf", "tracking", "moc", "masks", "map", "time_ms",
     ]  # fmt: skip
     assert list(dotmask["ekf"]) == [
         "position_rmse_m", "position_bias_m", "position_bias_ray_m", "position_rmse_ideal_m", "position_bias_ideal_m",

@@ -69,7 +69,11 @@ def without(frame: RgbdFrame, mask: np.ndarray) -> np.ndarray:
 
 
 def follow(slam: EmbeddedSlam, frames: list[RgbdFrame]) -> list[PoseEstimate]:
-    return [slam.track(frame, unmasked(frame)) for frame in frames]
+    estimates = []
+    for frame in frames:
+        estimates.append(slam.track(frame, unmasked(frame)))
+        slam.update_map(frame, unmasked(frame))
+    return estimates
 
 
 def error(estimate: PoseEstimate, k: int) -> tuple[float, float]:
@@ -183,9 +187,9 @@ def test_keyframes_hold_corners_of_mdi(frames):
     moving = np.zeros_like(right_half)
     moving[:80] = True
     slam = EmbeddedSlam(CAMERA, START)
-    slam.track(
-        frames[0], MaskedDepth(mo_mdi_m=without(frames[0], moving), mdi_m=without(frames[0], moving | right_half))
-    )
+    masked = MaskedDepth(mo_mdi_m=without(frames[0], moving), mdi_m=without(frames[0], moving | right_half))
+    slam.track(frames[0], masked)
+    slam.update_map(frames[0], masked)
     (keyframe,) = slam.keyframes
     assert len(keyframe.pixels) > 100
     assert keyframe.pixels[:, 0].max() < 159.5
@@ -211,7 +215,7 @@ def test_input_is_not_changed_and_may_be_read_only(frames):
     frame = frames[0]
     before = frame.rgb.tobytes(), frame.depth_m.tobytes()
     assert not frame.rgb.flags.writeable
-    EmbeddedSlam(CAMERA, START).track(frame, unmasked(frame))
+    follow(EmbeddedSlam(CAMERA, START), [frame])
     assert (frame.rgb.tobytes(), frame.depth_m.tobytes()) == before
 
 
