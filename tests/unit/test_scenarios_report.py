@@ -82,7 +82,7 @@ def test_report_json_follows_the_contract() -> None:
     ]  # fmt: skip
     assert list(dotmask["masks"]) == ["iou", "boundary_f", "leak", "waste"]
     assert list(dotmask["map"]) == ["ghost_fraction", "accuracy_m", "completeness"]
-    assert list(dotmask["loops"]) == ["count", "trans_error_m", "rot_error_rad"]
+    assert list(dotmask["loops"]) == ["count", "false_count", "trans_error_m", "trans_error_max_m", "rot_error_rad"]
     assert list(dotmask["time_ms"]) == ["segment", "track", "classify", "mask", "odometry", "map"]
 
 
