@@ -392,9 +392,12 @@ class SlamStatus(Enum):
     """State of the SLAM back end after a frame."""
 
     INITIALISING = "initialising"
+    """The map begins with this frame, at the pose that the back end was given."""
     TRACKED = "tracked"
     LOST = "lost"
+    """There is no pose: too little is seen, or nothing of it is known."""
     RELOCALISED = "relocalised"
+    """Found again: the first pose after a loss, or one found by looks alone when the motion before led nowhere."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -61,7 +61,7 @@ class EmbeddedSlam:
         self._extractor = FeatureExtractor(intrinsics, settings)
         self._odometry = Odometry(intrinsics, start, settings)
         self._store = KeyframeStore(intrinsics, settings)
-        self._started = False
+        self._started, self._is_lost = False, False
         self._last_time_s: float | None = None
         self._seen: _Seen | None = None
         self._poses: list[tuple[float, FloatArray]] = []
@@ -75,7 +75,8 @@ class EmbeddedSlam:
         """Pose of the camera at `frame`.
 
         The status is `INITIALISING` with the initial pose on the first frame that has enough features, `TRACKED` when
-        a pose was found, and else `LOST` without a pose; the next frame is then tried from the last pose found.
+        a pose was found by the motion before, `RELOCALISED` when it was found after a loss or by looks alone, and else
+        `LOST` without a pose; the next frame is then tried from the last pose found.
 
         Raises:
             ValueError: the frame has other intrinsics, the masked depth another size, or the time does not rise.
@@ -86,12 +87,13 @@ class EmbeddedSlam:
         features = self._extractor.extract(grey, masked.mo_mdi_m)
         if self._started:
             result = self._odometry.track(features, frame.timestamp_s)
-            status = SlamStatus.TRACKED
+            found_again = self._is_lost or (result is not None and result.is_relocalised)
+            status = SlamStatus.RELOCALISED if found_again else SlamStatus.TRACKED
         else:
             self._started = len(features) >= self._settings.min_inliers
             result = self._odometry.start(features, frame.timestamp_s) if self._started else None
             status = SlamStatus.INITIALISING
-        self._seen = None
+        self._seen, self._is_lost = None, self._started and result is None
         if result is None:
             return PoseEstimate(timestamp_s=frame.timestamp_s, T_world_camera=None, status=SlamStatus.LOST, inliers=0)
         self._seen = _Seen(grey=grey, features=features, T_world_camera=result.T_world_camera)
@@ -101,6 +103,7 @@ class EmbeddedSlam:
             T_world_camera=result.T_world_camera,
             status=status,
             inliers=result.inliers,
+            covariance=result.covariance,
         )
 
     def update_map(self, frame: RgbdFrame, masked: MaskedDepth) -> None:

@@ -38,8 +38,12 @@ class LocalMap:
         """(N, 32)."""
         return self._descriptors
 
-    def add(self, p_world: FloatArray, descriptors: Descriptors, frame: int) -> None:
-        """Add points seen for the first time in frame number `frame`, and drop old ones beyond the capacity."""
+    def add(self, p_world: FloatArray, descriptors: Descriptors, frame: int) -> int:
+        """Add points seen for the first time in frame number `frame`, and drop old ones beyond the capacity.
+
+        Returns:
+            The index of the first of them; they are the last in the map.
+        """
         count = len(p_world)
         self._p_world = np.concatenate([self._p_world, p_world])
         self._descriptors = np.concatenate([self._descriptors, descriptors])
@@ -49,6 +53,7 @@ class LocalMap:
             keep = np.sort(np.lexsort((self._observations, self._last_seen))[-self._capacity :])
             self._p_world, self._descriptors = self._p_world[keep], self._descriptors[keep]
             self._observations, self._last_seen = self._observations[keep], self._last_seen[keep]
+        return len(self) - count
 
     def observe(self, points: Indices, p_world: FloatArray, frame: int) -> None:
         """Move `points` towards where frame number `frame` saw them: a running mean.

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from dotmask.geometry import back_project, inverse, transform
 from dotmask.records import FloatArray, Intrinsics
-from dotmask.slam.features import Features
+from dotmask.slam.features import Descriptors, Features
 from dotmask.slam.local_map import LocalMap
 from dotmask.slam.matching import Matches, match_anywhere, match_near
 from dotmask.slam.pose_solver import NEAREST_M, PoseSolver, Solution
@@ -30,10 +30,15 @@ class OdometryResult:
     Attributes:
         T_world_camera: (4, 4).
         inliers: matches that agree with it; all features in the first frame.
+        covariance: (6, 6) of its error as a twist in the camera's frame, rotation then translation, against the local
+            map; 0 in the first frame, whose pose is given.
+        is_relocalised: whether it was found by looks alone, without a guess by the motion before.
     """
 
     T_world_camera: FloatArray
     inliers: int
+    covariance: FloatArray
+    is_relocalised: bool
 
 
 class Odometry:
@@ -60,7 +65,12 @@ class Odometry:
         """Take the first frame as seen from the initial pose."""
         self._time_s, self._last_inliers = time_s, len(features)
         self._add_points(features)
-        return OdometryResult(T_world_camera=inverse(self._T_camera_world), inliers=len(features))
+        return OdometryResult(
+            T_world_camera=inverse(self._T_camera_world),
+            inliers=len(features),
+            covariance=np.zeros((6, 6)),
+            is_relocalised=False,
+        )
 
     def track(self, features: Features, time_s: float) -> OdometryResult | None:
         """Pose of a frame at `time_s`, or None when too few features agree on one.
@@ -70,11 +80,54 @@ class Odometry:
         assert self._time_s is not None, "start comes first"
         self._frame += 1
         found = self._locate(features, self._predicted(time_s))
-        if found is None:
-            self._velocity = np.zeros(6)
+        if found is not None:
+            return self._accept(*found, features, time_s, is_relocalised=False)
+        matches = match_anywhere(
+            self._map.descriptors, features, max_hamming=self._settings.max_hamming, ratio=self._settings.ratio
+        )
+        solution = self._solve(matches, features)
+        if solution is not None and self._is_certain(solution):
+            return self._accept(solution, matches, features, time_s, is_relocalised=True)
+        self._velocity = np.zeros(6)
+        return None
+
+    def relocalise(
+        self, p_world: FloatArray, descriptors: Descriptors, features: Features, time_s: float
+    ) -> OdometryResult | None:
+        """Pose of a frame that `track` found none for, by points that the local map has lost, or None.
+
+        Args:
+            p_world: (N, 3) points of a place that may be in view; they join the local map if they are.
+            descriptors: (N, 32) of the points.
+            features: of the frame.
+            time_s: of the frame.
+        """
+        s = self._settings
+        matches = match_anywhere(descriptors, features, max_hamming=s.max_hamming, ratio=s.ratio)
+        points, corners = matches.T
+        solution = self._solver.solve(p_world[points], features.pixels[corners], features.depth_m[corners])
+        if solution is None or not self._is_certain(solution):
             return None
-        solution, matches = found
-        self._velocity = _velocity(self._T_camera_world, solution.T_camera_world, time_s - self._time_s)
+        first = self._map.add(p_world, descriptors, self._frame)
+        matches[:, 0] += first
+        return self._accept(solution, matches, features, time_s, is_relocalised=True)
+
+    def _is_certain(self, solution: Solution) -> bool:
+        """Whether a pose that no motion speaks for is the place, and not one that looks like it."""
+        sigma_m = float(np.sqrt(np.trace(solution.covariance[3:, 3:])))
+        return sigma_m <= self._settings.relocalisation_sigma_m
+
+    def _accept(
+        self, solution: Solution, matches: Matches, features: Features, time_s: float, *, is_relocalised: bool
+    ) -> OdometryResult:
+        """Take the pose as that of the frame, and teach the local map what was seen from it."""
+        assert self._time_s is not None
+        # A camera that was found again may have been anywhere in between.
+        self._velocity = (
+            np.zeros(6)
+            if is_relocalised
+            else _velocity(self._T_camera_world, solution.T_camera_world, time_s - self._time_s)
+        )
         self._T_camera_world, self._time_s = solution.T_camera_world, time_s
         self._last_inliers = len(solution.inliers)
         T_world_camera = inverse(solution.T_camera_world)
@@ -86,7 +139,12 @@ class Odometry:
             unmatched = np.ones(len(features), np.bool_)
             unmatched[matches[:, 1]] = False
             self._add_points(features.select(unmatched))
-        return OdometryResult(T_world_camera=T_world_camera, inliers=len(points))
+        return OdometryResult(
+            T_world_camera=T_world_camera,
+            inliers=len(points),
+            covariance=solution.covariance,
+            is_relocalised=is_relocalised,
+        )
 
     def _add_points(self, features: Features) -> None:
         p_camera = back_project(features.pixels, features.depth_m, self._camera)
@@ -102,7 +160,7 @@ class Odometry:
         return np.asarray(T_now_before @ self._T_camera_world)
 
     def _locate(self, features: Features, T_camera_world_guess: FloatArray) -> tuple[Solution, Matches] | None:
-        """Pose and matches: by a small window, by a wide one, and without any guess, until one is convincing."""
+        """Pose and matches: by a small window, then by a wide one, until one is convincing."""
         s = self._settings
         best: tuple[Solution, Matches] | None = None
         visible, expected_px = self._visible(T_camera_world_guess)
@@ -120,10 +178,7 @@ class Odometry:
             # A sudden fall of the inliers means that the guess was off, and the window held only some of them.
             if best is not None and len(best[0].inliers) >= CONVINCING_SHARE * self._last_inliers:
                 return best
-        if best is not None:
-            return best
-        matches = match_anywhere(self._map.descriptors, features, max_hamming=s.max_hamming, ratio=s.ratio)
-        return _better(None, self._solve(matches, features), matches)
+        return best
 
     def _solve(self, matches: Matches, features: Features) -> Solution | None:
         points, corners = matches.T

@@ -1,4 +1,4 @@
-"""Camera pose from matched map points: PnP RANSAC, then robust least squares on pixels and depth."""
+"""Camera pose and its covariance from matched map points: PnP RANSAC, then robust least squares on pixels and depth."""
 
 from dataclasses import dataclass
 
@@ -28,10 +28,34 @@ class Solution:
     Attributes:
         T_camera_world: (4, 4).
         inliers: (K,) indices into the matches.
+        covariance: (6, 6) of the pose's error as a twist in the camera's frame, rotation then translation: what the
+            spread of the residuals says, with the map points as they are.
     """
 
     T_camera_world: FloatArray
     inliers: npt.NDArray[np.intp]
+    covariance: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Linearised:
+    """Residuals of N matches at a pose, three each: u, v, depth.
+
+    Attributes:
+        residual: (3N,) pixels of the reference width, then standard deviations of depth.
+        weight: (3N,) of the Huber loss.
+        J: (3N, 6) derivatives of the residuals over the twist.
+    """
+
+    residual: FloatArray
+    weight: FloatArray
+    J: FloatArray
+
+    def normal_equations(self) -> tuple[FloatArray, FloatArray]:
+        """Hessian (6, 6) and gradient (6,) of the loss."""
+        # einsum of two operands sums in a fixed order; a BLAS product may not, for another number of threads.
+        weighted = self.J * self.weight[:, None]
+        return np.einsum("ni,nj->ij", weighted, self.J), np.einsum("ni,n->i", weighted, self.residual)
 
 
 class PoseSolver:
@@ -93,7 +117,11 @@ class PoseSolver:
                 break
         if len(inliers) < s.min_inliers:
             return None
-        return Solution(T_camera_world=T_camera_world, inliers=inliers)
+        return Solution(
+            T_camera_world=T_camera_world,
+            inliers=inliers,
+            covariance=self._covariance(T_camera_world, p_world[inliers], pixels[inliers], depth_m[inliers]),
+        )
 
     def refine(
         self, T_camera_world: FloatArray, p_world: FloatArray, pixels: FloatArray, depth_m: FloatArray
@@ -104,39 +132,61 @@ class PoseSolver:
         The increment is a twist (rotation w, translation t) from the left: with `Y = T X`, `dY = w x Y + t`. So for a
         residual with gradient g over Y, the derivative is g over t and `Y x g` over w.
         """
-        camera, delta = self._camera, self._settings.huber
-        inverse_sigma = 1.0 / self.depth_sigma(depth_m)
-        fx, fy = camera.fx / self._scale, camera.fy / self._scale
-        seen_x, seen_y = (pixels[:, 0] - camera.cx) / self._scale, (pixels[:, 1] - camera.cy) / self._scale
-        zero = np.zeros_like(depth_m)
         T = T_camera_world
         for _ in range(GAUSS_NEWTON_STEPS):
-            x, y, z = transform(T, p_world).T
-            inverse_z = 1.0 / np.maximum(z, NEAREST_M)
-            a, b = fx * inverse_z, fy * inverse_z
-            r_u, r_v, r_z = a * x - seen_x, b * y - seen_y, (z - depth_m) * inverse_sigma
-            # Rows of the Jacobian: derivative over (w, t). Huber: weight 1 inside the threshold, threshold/|r| outside.
-            pixel_weight = delta / np.maximum(np.hypot(r_u, r_v), delta)
-            depth_weight = delta / np.maximum(np.abs(r_z), delta)
-            g_u, g_v, g_z = -a * x * inverse_z, -b * y * inverse_z, inverse_sigma
-            J = np.concatenate(
-                [
-                    np.stack([y * g_u, z * a - x * g_u, -y * a, a, zero, g_u], axis=1),
-                    np.stack([y * g_v - z * b, -x * g_v, x * b, zero, b, g_v], axis=1),
-                    np.stack([y * g_z, -x * g_z, zero, zero, zero, g_z], axis=1),
-                ]
-            )
-            weight = np.concatenate([pixel_weight, pixel_weight, depth_weight])
-            residual = np.concatenate([r_u, r_v, r_z])
-            # einsum of two operands sums in a fixed order; a BLAS product may not, for another number of threads.
-            weighted = J * weight[:, None]
-            hessian = np.einsum("ni,nj->ij", weighted, J)
-            gradient = np.einsum("ni,n->i", weighted, residual)
+            hessian, gradient = self._linearise(T, p_world, pixels, depth_m).normal_equations()
             step = -np.linalg.solve(hessian + 1e-9 * np.trace(hessian) * np.eye(6), gradient)
             T = _increment(step) @ T
             if np.abs(step).max() < CONVERGED:
                 break
         return T
+
+    def _linearise(
+        self, T_camera_world: FloatArray, p_world: FloatArray, pixels: FloatArray, depth_m: FloatArray
+    ) -> _Linearised:
+        camera, delta = self._camera, self._settings.huber
+        inverse_sigma = 1.0 / self.depth_sigma(depth_m)
+        fx, fy = camera.fx / self._scale, camera.fy / self._scale
+        seen_x, seen_y = (pixels[:, 0] - camera.cx) / self._scale, (pixels[:, 1] - camera.cy) / self._scale
+        zero = np.zeros_like(depth_m)
+        x, y, z = transform(T_camera_world, p_world).T
+        inverse_z = 1.0 / np.maximum(z, NEAREST_M)
+        a, b = fx * inverse_z, fy * inverse_z
+        r_u, r_v, r_z = a * x - seen_x, b * y - seen_y, (z - depth_m) * inverse_sigma
+        # Rows of the Jacobian: derivative over (w, t). Huber: weight 1 inside the threshold, threshold/|r| outside.
+        pixel_weight = delta / np.maximum(np.hypot(r_u, r_v), delta)
+        depth_weight = delta / np.maximum(np.abs(r_z), delta)
+        g_u, g_v, g_z = -a * x * inverse_z, -b * y * inverse_z, inverse_sigma
+        J = np.concatenate(
+            [
+                np.stack([y * g_u, z * a - x * g_u, -y * a, a, zero, g_u], axis=1),
+                np.stack([y * g_v - z * b, -x * g_v, x * b, zero, b, g_v], axis=1),
+                np.stack([y * g_z, -x * g_z, zero, zero, zero, g_z], axis=1),
+            ]
+        )
+        return _Linearised(
+            residual=np.concatenate([r_u, r_v, r_z]),
+            weight=np.concatenate([pixel_weight, pixel_weight, depth_weight]),
+            J=J,
+        )
+
+    def _covariance(
+        self, T_camera_world: FloatArray, p_world: FloatArray, pixels: FloatArray, depth_m: FloatArray
+    ) -> FloatArray:
+        """(6, 6) of the twist by the sandwich estimator `H⁻¹ (Σ gᵢ gᵢᵀ) H⁻¹` (Huber 1967, White 1982).
+
+        `gᵢ` is the gradient of the three residuals of a match, which need not be independent. So the noise needs no
+        model: it is read off the residuals.
+        """
+        at = self._linearise(T_camera_world, p_world, pixels, depth_m)
+        hessian, _ = at.normal_equations()
+        gradients = (at.J * (at.weight * at.residual)[:, None]).reshape(3, -1, 6).sum(axis=0)
+        spread = np.einsum("ni,nj->ij", gradients, gradients)
+        inverse_hessian = np.linalg.inv(hessian + 1e-9 * np.trace(hessian) * np.eye(6))
+        # Six numbers were fitted to the residuals, which are the smaller for it.
+        freedom = 3 * len(depth_m) / (3 * len(depth_m) - 6)
+        covariance = freedom * inverse_hessian @ spread @ inverse_hessian
+        return np.asarray((covariance + covariance.T) / 2)
 
     def _agreeing(
         self, T_camera_world: FloatArray, p_world: FloatArray, pixels: FloatArray, depth_m: FloatArray

@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from dotmask.geometry import inverse
+from dotmask.geometry import back_project, inverse, transform
 from dotmask.records import Intrinsics, MaskedDepth, PoseEstimate, RgbdFrame, SlamStatus
 from dotmask.slam.embedded import EmbeddedSlam
+from dotmask.slam.features import FeatureExtractor
+from dotmask.slam.odometry import Odometry
 from dotmask.slam.settings import OdometrySettings
 
 CAMERA = Intrinsics(width=320, height=240, fx=262.0, fy=275.0, cx=158.0, cy=121.5)
@@ -125,9 +127,43 @@ def test_blank_frame_is_lost_and_the_next_is_found_again(frames, blank):
     assert lost.T_world_camera is None
     assert lost.inliers == 0
     found = slam.track(frames[3], unmasked(frames[3]))
-    assert found.status is SlamStatus.TRACKED
+    assert found.status is SlamStatus.RELOCALISED
+    assert slam.track(frames[4], unmasked(frames[4])).status is SlamStatus.TRACKED
     # It has moved 79 mm from the start; 6 mm is 0.6 pixels at the wall.
     assert error(found, 3)[0] < 0.006
+
+
+def test_a_camera_that_was_carried_elsewhere_is_lost_and_found_where_it_was_before(frames):
+    slam = EmbeddedSlam(CAMERA, START)
+    follow(slam, frames[:3])
+    elsewhere = replace(frames[3], rgb=np.ascontiguousarray(frames[3].rgb[::-1, ::-1]))
+    lost = slam.track(elsewhere, unmasked(elsewhere))
+    assert (lost.status, lost.T_world_camera, lost.covariance) == (SlamStatus.LOST, None, None)
+    # Turned by 12 degrees within a frame: neither window reaches so far, the looks do.
+    turned, _ = render(18)
+    found = slam.track(turned, unmasked(turned))
+    assert found.status is SlamStatus.RELOCALISED
+    assert error(found, 18)[0] < 0.02
+    following, _ = render(19)
+    assert slam.track(following, unmasked(following)).status is SlamStatus.TRACKED
+
+
+def test_points_of_an_old_place_find_a_camera_that_the_local_map_cannot(frames):
+    extractor = FeatureExtractor(CAMERA, OdometrySettings())
+    old, new = (
+        extractor.extract(cv2.cvtColor(render(k)[0].rgb, cv2.COLOR_RGB2GRAY), render(k)[0].depth_m) for k in (0, 60)
+    )
+    odometry = Odometry(CAMERA, START @ pose_in_scene(60), OdometrySettings())
+    odometry.start(new, 0.0)
+    p_world = transform(START, back_project(old.pixels, old.depth_m, CAMERA))
+    assert odometry.relocalise(p_world[:10], old.descriptors[:10], old, 0.1) is None
+    found = odometry.relocalise(p_world, old.descriptors, old, 0.1)
+    assert found is not None
+    assert found.is_relocalised
+    np.testing.assert_allclose(found.T_world_camera, START, atol=1e-4)
+    following = odometry.track(old, 0.2)
+    assert following is not None
+    assert not following.is_relocalised
 
 
 def test_waits_for_features_before_it_starts(frames, blank):

@@ -140,6 +140,27 @@ def test_refinement_is_the_least_squares_solution():
     np.testing.assert_allclose(refined[:3, 3], best[3:], atol=1e-7)
 
 
+@pytest.mark.parametrize("outliers", [0, 15])
+def test_covariance_is_that_of_the_errors(outliers):
+    solver = PoseSolver(CAMERA, SETTINGS)
+    rng = np.random.default_rng(11)
+    nees = []
+    for _ in range(150):
+        T, p_world, pixels, depth = scene(rng, 300)
+        # Noise of other sizes than the settings assume: the residuals must tell.
+        pixels = pixels + rng.normal(0, 0.4, pixels.shape)
+        depth = depth + 0.5 * rng.normal(0, 1, depth.shape) * solver.depth_sigma(depth)
+        pixels[:outliers] += 40.0
+        solution = solver.solve(p_world, pixels, depth)
+        assert solution is not None
+        error = solution.T_camera_world @ inverse(T)
+        twist = np.concatenate([Rotation.from_matrix(error[:3, :3]).as_rotvec(), error[:3, 3]])
+        nees.append(twist @ np.linalg.solve(solution.covariance, twist))
+    # The mean of 150 values of chi-square with 6 degrees of freedom has a deviation of 0.28; a covariance that is
+    # estimated from 300 matches adds some percent.
+    assert 5.2 < np.mean(nees) < 7.1
+
+
 def test_pixel_thresholds_scale_with_the_image():
     half = Intrinsics(width=320, height=240, fx=260.0, fy=280.0, cx=155.0, cy=122.5)
     _, p_world, pixels, depth = scene(np.random.default_rng(9), 100)
