@@ -18,6 +18,7 @@ from sim.rooms.long_office import build_long_office
 from sim.rooms.office import build_office
 from sim.rooms.room import Room
 from sim.scene import Frozen, Scene, SceneObject
+from sim.sensor.failures import SensorFailure
 from sim.sensor.parameters import SENSORS, Sensor
 from sim.sensor.timing import Timing
 from sim.simulator import Renderer, Simulator
@@ -101,4 +102,8 @@ def _varied(variant: str, cast: tuple[SceneObject, ...], props: tuple[SceneObjec
 
 def _sensor(spec: SensorSpec) -> Sensor:
     sensor = SENSORS[spec.model]
-    return sensor if spec.motion_errors else replace(sensor, timing=Timing())
+    return replace(
+        sensor,
+        timing=sensor.timing if spec.motion_errors else Timing(),
+        failures=tuple(SensorFailure(kind=f.kind, first=f.first, frames=f.frames) for f in spec.failures),
+    )

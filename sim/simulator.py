@@ -17,6 +17,7 @@ from sim.geometry import on_grid
 from sim.records import CameraModel, GroundTruth, Moment, RenderedImages, SimFrame
 from sim.scene import Scene
 from sim.sensor.exposure import expose
+from sim.sensor.failures import delivered, failed
 from sim.sensor.parameters import Sensor
 from sim.truth import SurfaceMoments, object_truth
 
@@ -76,7 +77,7 @@ class Simulator:
         self._period_s = 1.0 / frame_rate_hz
         self._moments = {actor.name: SurfaceMoments.of(actor) for actor in scene.actors}
         self._last_s = (frames - 1) / frame_rate_hz
-        self._captured = sensor.timing.delivered(frames, seed)
+        self._captured = delivered(sensor.timing.delivered(frames, seed), sensor.failures)
         self._times_s = self._captured / frame_rate_hz
         self._stamps_s = sensor.timing.stamps_s(self._captured, frame_rate_hz, seed)
 
@@ -135,9 +136,9 @@ class Simulator:
             )
             for actor in self.scene.actors
         )
-        rgb, depth_m = self.sensor.model.measure(
-            self._seen(images, time_s), self.camera, self._seed, int(self._captured[index])
-        )
+        captured = int(self._captured[index])
+        measured = self.sensor.model.measure(self._seen(images, time_s), self.camera, self._seed, captured)
+        rgb, depth_m = failed(*measured, captured, self.sensor.failures)
         return SimFrame(
             index=index,
             timestamp_s=float(self._stamps_s[index]),

@@ -60,6 +60,7 @@ class Odometry:
         self._velocity = np.zeros(6)  # (rotation vector, translation) per second of T_now_before
         self._frame = 0
         self._last_inliers = 0
+        self._is_lost = False
 
     def start(self, features: Features, time_s: float) -> OdometryResult:
         """Take the first frame as seen from the initial pose."""
@@ -80,7 +81,7 @@ class Odometry:
         assert self._time_s is not None, "start comes first"
         self._frame += 1
         found = self._locate(features, self._predicted(time_s))
-        if found is not None:
+        if found is not None and (not self._is_lost or self._is_certain(found[0])):
             return self._accept(*found, features, time_s, is_relocalised=False)
         matches = match_anywhere(
             self._map.descriptors, features, max_hamming=self._settings.max_hamming, ratio=self._settings.ratio
@@ -88,7 +89,7 @@ class Odometry:
         solution = self._solve(matches, features)
         if solution is not None and self._is_certain(solution):
             return self._accept(solution, matches, features, time_s, is_relocalised=True)
-        self._velocity = np.zeros(6)
+        self._velocity, self._is_lost = np.zeros(6), True
         return None
 
     def relocalise(
@@ -113,9 +114,9 @@ class Odometry:
         return self._accept(solution, matches, features, time_s, is_relocalised=True)
 
     def _is_certain(self, solution: Solution) -> bool:
-        """Whether a pose that no motion speaks for is the place, and not one that looks like it."""
-        sigma_m = float(np.sqrt(np.trace(solution.covariance[3:, 3:])))
-        return sigma_m <= self._settings.relocalisation_sigma_m
+        """Whether a pose that no motion before it speaks for is the place, and not one that looks like it."""
+        s, sigma_m = self._settings, float(np.sqrt(np.trace(solution.covariance[3:, 3:])))
+        return len(solution.inliers) >= s.relocalisation_inliers and sigma_m <= s.relocalisation_sigma_m
 
     def _accept(
         self, solution: Solution, matches: Matches, features: Features, time_s: float, *, is_relocalised: bool
@@ -129,7 +130,7 @@ class Odometry:
             else _velocity(self._T_camera_world, solution.T_camera_world, time_s - self._time_s)
         )
         self._T_camera_world, self._time_s = solution.T_camera_world, time_s
-        self._last_inliers = len(solution.inliers)
+        self._last_inliers, self._is_lost = len(solution.inliers), False
         T_world_camera = inverse(solution.T_camera_world)
 
         points, corners = matches[solution.inliers].T

@@ -32,8 +32,9 @@ class OdometrySettings:
         depth_sigma_floor_m: standard deviation of depth is `floor + growth z²`, metres ...
         depth_sigma_growth_per_m: ... growing as with a structured-light camera (Khoshelham & Elberink 2012).
         min_inliers: with fewer the frame is lost.
-        relocalisation_sigma_m: a pose that was found by looks alone counts when the standard deviation of its position
-            is no more than this; between the rooms and places of the scenarios, wrong poses have 0.025 m and more.
+        relocalisation_inliers: a pose that no motion speaks for counts with at least so many inliers ...
+        relocalisation_sigma_m: ... when the standard deviation of its position is no more than this; among rooms and
+            places of the scenarios wrong poses have more.
         insert_below: new map points are added when fewer than this share of the features are inliers.
         map_points: at most this many points in the local map.
         fusion_depth: observations a map point's mean goes back, so that it can follow slow drift.
@@ -60,7 +61,8 @@ class OdometrySettings:
     depth_sigma_floor_m: float = 0.004
     depth_sigma_growth_per_m: float = 0.003
     min_inliers: int = 15
-    relocalisation_sigma_m: float = 0.02
+    relocalisation_inliers: int = 30
+    relocalisation_sigma_m: float = 0.01
     insert_below: float = 0.7
     map_points: int = 5000
     fusion_depth: int = 20

@@ -37,7 +37,7 @@ from scenarios.spec.people import (
     WalkLoopAct,
 )
 from scenarios.spec.scenario import Scenario, scenario_from_json, with_overrides
-from scenarios.spec.sensor import SensorSpec
+from scenarios.spec.sensor import SensorFailureSpec, SensorSpec
 from scenarios.spec.things import ImpulseSpec, ThingSpec
 
 __all__ = [
@@ -62,6 +62,7 @@ __all__ = [
     "RobotCameraSpec",
     "Scenario",
     "ScoresSpec",
+    "SensorFailureSpec",
     "SensorSpec",
     "SitAct",
     "SitDownAct",

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
+from sim.sensor.failures import SensorFailure
 from sim.sensor.model import SensorModel
 from sim.sensor.timing import Timing
 
@@ -32,11 +33,13 @@ class Sensor:
         model: the errors of single images.
         timing: the errors in time.
         sources: where the numbers are from, by field of `model` and `timing`.
+        failures: what it does not deliver for a while.
     """
 
     model: SensorModel
     timing: Timing
     sources: Mapping[str, str]
+    failures: tuple[SensorFailure, ...] = ()
 
 
 IDEAL = Sensor(model=SensorModel(), timing=Timing(), sources=MappingProxyType({}))

@@ -22,6 +22,7 @@ ASKED_FOR = {
     "fault_missed", "fault_missed_bursts", "fault_false_positives", "fault_late_masks", "fault_eroded_masks",
     "fault_dilated_masks", "fault_split", "fault_merged", "fault_identity_shuffle", "fault_class_flips",
     "fault_score_shuffle", "fault_tilted", "fault_few_detections",
+    "failing_sensor", "kidnapped", "blank_wall",
 }  # fmt: skip
 WITH_OWN_FRAMES = sorted(set(RENDERED_AS.values()))
 """How people and cameras move is the same in scenarios that share their frames."""
