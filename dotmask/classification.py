@@ -45,7 +45,8 @@ def classify(track: Track, previous: Track | None, profile: Profile) -> Verdict:
     is_fast = speed > model.speed_threshold_m_s
     reason, speaks_for_rest = Reason.IDLE, True
     if surface is not None:
-        is_shifted = surface.moving_share >= moving_share
+        least_points = 1 if was_moving else model.moving_points
+        is_shifted = surface.moving_share >= moving_share and surface.moving_points >= least_points
         is_surface_fast = float(np.linalg.norm(surface.velocity_world)) > model.speed_threshold_m_s
         if model.is_non_rigid and is_shifted:
             reason = Reason.SURFACE  # a hand may move before the body does, without a change of the mask
@@ -79,6 +80,8 @@ def classify(track: Track, previous: Track | None, profile: Profile) -> Verdict:
 def _is_significant(track: Track, confidence: float) -> bool:
     """Whether zero velocity lies outside the `confidence` region of the velocity (chi-square, 3 degrees of freedom)."""
     v = track.velocity_world
+    if confidence == 0:
+        return True
     return float(v @ np.linalg.solve(track.covariance[3:, 3:], v)) > _quantile(confidence)
 
 

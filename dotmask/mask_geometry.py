@@ -45,7 +45,7 @@ def aligned_iou(first: MaskImage, second: MaskImage) -> float:
     a, b = bounding_rectangle(first), bounding_rectangle(second)
     if a[2] == 0 or b[2] == 0:
         return 0.0
-    one = cv2.resize(_cut(first, a), (b[2], b[3]), interpolation=cv2.INTER_NEAREST).view(np.bool_)
+    one = cv2.resize(_cut(first, a), (b[2], b[3]), interpolation=cv2.INTER_NEAREST_EXACT).view(np.bool_)
     other = _cut(second, b).view(np.bool_)
     return int(np.count_nonzero(one & other)) / int(np.count_nonzero(one | other))
 

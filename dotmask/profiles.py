@@ -39,7 +39,8 @@ class ClassModel:
             because it turns and swings (calibrated).
         moving_share: share of the surface's points that must move for an object to be moving: a hand of what is not
             rigid, most of what is (calibrated).
-        still_moving_share: the same for an object that was moving before: between strokes a hand hardly moves
+        moving_points: and so many points at least: one alone may have slipped (calibrated).
+        still_moving_share: the share for an object that was moving before: between strokes a hand hardly moves
             (calibrated).
     """
 
@@ -53,6 +54,7 @@ class ClassModel:
     slide_sigma_m: float = 0.0
     surface_sigma_m_s: float = 0.0
     moving_share: float = 0.5
+    moving_points: int = 1
     still_moving_share: float = 0.5
 
     def __post_init__(self) -> None:
@@ -160,6 +162,7 @@ class Profile:
         score_threshold: detections below it are dropped (paper, Table I).
         max_observations: at most this many detections, the best first (paper, Table I: m).
         max_misses: a track ends when it was not observed for this many frames (paper, Table I: e).
+        max_misses_idle: the same for a track that was idle: it is where it was when the camera looks back (calibrated).
         confirming_hits: a track that was seen less often is tentative and ends when it is missed (not in the paper).
         measurement: what is measured of a detection (see dotmask.tracking.measurement.observe); paper: `bbox_centre`.
         noise: the model behind R.
@@ -193,6 +196,7 @@ class Profile:
     score_threshold: float
     max_observations: int
     max_misses: int
+    max_misses_idle: int
     confirming_hits: int
     measurement: Measurement
     noise: MeasurementNoise
@@ -217,6 +221,7 @@ class Profile:
         for name in (
             "max_observations",
             "max_misses",
+            "max_misses_idle",
             "confirming_hits",
             "min_depth_pixels",
             "proof_frames",
@@ -264,6 +269,7 @@ PAPER = Profile(
     score_threshold=0.1,
     max_observations=5,
     max_misses=10,
+    max_misses_idle=10,
     confirming_hits=1,
     measurement="bbox_centre",
     noise=MeasurementNoise(pixel_sigma_px=4.0, depth_sigma_m=0.02, depth_sigma_per_m=0.0019, is_diagonal=True),
@@ -321,8 +327,9 @@ CALIBRATED = Profile(
             shape_sigma_m=(0.03, 0.02, 0.03),
             slide_sigma_m=0.2,
             surface_sigma_m_s=0.15,
-            moving_share=0.1,
-            still_moving_share=0.05,
+            moving_share=0.06,
+            moving_points=2,
+            still_moving_share=0.03,
         ),
         _calibrated_thing("chair", shape_sigma_m=0.012, slide_sigma_m=0.2),
         _calibrated_thing("cup", shape_sigma_m=0.005, slide_sigma_m=0.05),
@@ -331,6 +338,7 @@ CALIBRATED = Profile(
     score_threshold=0.3,
     max_observations=10,
     max_misses=90,
+    max_misses_idle=150,
     confirming_hits=3,
     measurement="bbox_centre",
     noise=MeasurementNoise(
@@ -346,7 +354,7 @@ CALIBRATED = Profile(
         pose_position_sigma_m=0.003,
         pose_rotation_sigma_rad=0.002,
     ),
-    min_depth_pixels=30,
+    min_depth_pixels=12,
     depth_trim_m=0.8,
     gate_probability=0.98,
     least_mask_likelihood=0.02,
@@ -389,6 +397,7 @@ ORIGINAL = replace(
     score_threshold=0.1,
     max_observations=5,
     max_misses=10,
+    max_misses_idle=10,
     deformation_iou=0.9,
     growth=MaskGrowth(base_px=1.0),
     pose_feedback="previous",

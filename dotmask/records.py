@@ -36,7 +36,7 @@ def checked(array: Any, name: str, shape: tuple[int | None, ...], dtype: type) -
     Raises:
         ValueError: the shape or the type is another one, or a float array is not finite.
     """
-    if type(array) is np.ndarray and array.shape == shape and array.dtype.type is dtype and array.dtype.isnative:
+    if type(array) is np.ndarray and array.dtype.type is dtype and array.dtype.isnative and _fits(array.shape, shape):
         given: npt.NDArray[Any] = array
         if not given.flags.writeable:
             return given
@@ -53,13 +53,17 @@ def _converted(array: Any, name: str, shape: tuple[int | None, ...], dtype: type
         if given.dtype.kind not in "iufb" or not np.can_cast(given.dtype, dtype, "safe"):
             raise ValueError(f"{name}: expected {np.dtype(dtype)}, got {given.dtype}")
         given = given.astype(dtype)
-    matches = len(given.shape) == len(shape) and all(
-        want is None or have == want for have, want in zip(given.shape, shape, strict=True)
-    )
-    if not matches:
+    if not _fits(given.shape, shape):
         wanted = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ")"
         raise ValueError(f"{name}: expected shape {wanted}, got {given.shape}")
     return given
+
+
+def _fits(have: tuple[int, ...], want: tuple[int | None, ...]) -> bool:
+    """Whether a shape is the wanted one, where None stands for any length."""
+    return have == want or (
+        len(have) == len(want) and all(w is None or h == w for h, w in zip(have, want, strict=True))
+    )
 
 
 def check_finite(array: npt.NDArray[Any], name: str) -> None:
@@ -263,15 +267,20 @@ class SurfaceMotion:
 
     Attributes:
         points: how many were followed.
-        moving_share: share of them that are not where they would be if they stood still.
+        moving_points: how many of them are not where they would be if they stood still.
         velocity_world: (3,) their median velocity, metres per second.
         covariance: (3, 3) of it as a measure of the object's velocity.
     """
 
     points: int
-    moving_share: float
+    moving_points: int
     velocity_world: FloatArray
     covariance: FloatArray
+
+    @property
+    def moving_share(self) -> float:
+        """Share of the points that move."""
+        return self.moving_points / self.points
 
 
 class TrackPhase(Enum):

@@ -19,7 +19,7 @@ from scenarios.world import build_simulator
 SCENARIO = "fr3_walking_xyz"
 WARM_UP_FRAMES = 3
 
-BUDGETS_MS = {"render": 40.0, "truth and sensor": 16.0, "method without segmentation": 5.0, "odometry": 20.0}
+BUDGETS_MS = {"render": 30.0, "truth and sensor": 12.0, "method without segmentation": 3.0, "odometry": 20.0}
 """CPU milliseconds per frame at 640x480. The method is all from observing the detections to the masked depth."""
 
 

@@ -66,7 +66,9 @@ def innovate(track: Track, observation: Observation, T_world_camera: FloatArray)
     h is taken as linear around the prediction; where that is so far off (behind the camera, or at less than half or
     more than twice the measured depth) that it is not, around the observation.
     """
-    residuals, S, H = _innovations(track.mean[None], track.covariance[None], [observation], T_world_camera)
+    residuals, S, H = _innovations(
+        track.mean[None], track.covariance[None], [observation], observation.covariance[None], T_world_camera
+    )
     return Innovation(residual=residuals[0], covariance=S[0]), H[0]
 
 
@@ -105,7 +107,7 @@ def update_all(
     means = np.array([track.mean for track in tracks])
     P = np.array([track.covariance for track in tracks])
     R = np.array([observation.covariance for observation in observations])
-    residuals, S, H = _innovations(means, P, observations, T_world_camera)
+    residuals, S, H = _innovations(means, P, observations, R, T_world_camera)
     means, P = _corrected(means, P, residuals, S, H, R)
     followed = [(i, surface) for i, surface in enumerate(surfaces) if surface is not None]
     if followed:
@@ -146,12 +148,11 @@ def slide(track: Track, variance_m2: float) -> Track:
 
 
 def _innovations(
-    means: FloatArray, P: FloatArray, observations: Sequence[Observation], T_world_camera: FloatArray
+    means: FloatArray, P: FloatArray, observations: Sequence[Observation], R: FloatArray, T_world_camera: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Residuals y (N, 3), S (N, 3, 3) and H (N, 3, 6) of beliefs (N, 6) and (N, 6, 6), see `innovate`."""
+    """Residuals y (N, 3), S (N, 3, 3) and H (N, 3, 6) of beliefs (N, 6), (N, 6, 6), see `innovate`; R (N, 3, 3)."""
     model = observations[0].model  # one frame's observations are made alike
     p_seen = np.array([observation.position_camera for observation in observations])
-    R = np.array([observation.covariance for observation in observations])
     p_camera = transform(inverse(T_world_camera), means[:, :3])
     depth, seen_depth = p_camera[:, 2:], p_seen[:, 2:]
     p_linear = np.where((0.5 * seen_depth < depth) & (depth < 2.0 * seen_depth), p_camera, p_seen)

@@ -27,8 +27,12 @@ _MOST_DIFFERENCE = 8.0
 """Mean difference in grey levels between the surroundings of a point then and now; more, and it was not found again."""
 _BORDER = np.ones((5, 5), np.uint8)
 """Points keep off a mask's border by two pixels of the half size image: there, the background moves with them."""
+_MARGIN_PX = _WINDOW_PX // 2 - _BORDER.shape[0] // 2
+"""With that, the window around a point lies in the image: at the image's border points slide."""
 _CORNER_QUALITY, _CORNER_DISTANCE_PX, _HARRIS_K = 0.001, 4, 0.04
 """By the measure of Harris and Stephens (1988), which refuses edges: a point would slide along a stripe."""
+_LEAST_HOLD = 0.1
+"""Of the window that is searched for; Harris and Stephens look at three pixels, where the corner of a stripe is one."""
 _SPREAD = 0.6
 """Corners keep this share of the distance that they would have if they were spread evenly: they are found on the arms
 as well as on the print of a shirt."""
@@ -109,10 +113,10 @@ def follow(
         fresh = _corners(grey, regions[index], pixels[owner == index], settings.points)
         if len(fresh):
             fresh_camera = _lift(fresh, frame.depth_m, frame.intrinsics)
-            has_depth = fresh_camera[:, 2] > 0
-            pixels = np.concatenate([pixels, fresh[has_depth]])
-            p_camera = np.concatenate([p_camera, fresh_camera[has_depth]])
-            owner = np.concatenate([owner, np.full(np.count_nonzero(has_depth), index)])
+            is_usable = (fresh_camera[:, 2] > 0) & _is_held(grey, fresh)
+            pixels = np.concatenate([pixels, fresh[is_usable]])
+            p_camera = np.concatenate([p_camera, fresh_camera[is_usable]])
+            owner = np.concatenate([owner, np.full(np.count_nonzero(is_usable), index)])
     past_world = np.full((len(pixels), memory, 3), np.nan)
     past_pixels = np.full((len(pixels), memory, 2), np.nan, np.float32)
     if before is not None and len(kept):
@@ -177,16 +181,20 @@ def surface_motions(
     R_world_camera = T_world_camera[:3, :3]
     velocities = (transform(T_world_camera, p_camera) - past[rows, lag]) / elapsed_s[lag, None]
     velocities = velocities @ R_world_camera  # camera axes
-    for index in map(int, np.flatnonzero(counts >= settings.least_points)):
-        count, mine = int(counts[index]), velocities[owner == index]
-        middle = _median(mine)
-        spread = 1.4826 * _median(np.abs(mine - middle))
+    enough = np.flatnonzero(counts >= settings.least_points)
+    if not len(enough):
+        return tuple(motions)
+    mine = _gathered(velocities, owner, counts)[enough]
+    middles = _medians(mine, counts[enough])
+    spreads = 1.4826 * _medians(np.abs(mine - middles[:, None]), counts[enough])
+    for index, middle, spread in zip(enough.tolist(), middles, spreads, strict=True):
+        count = int(counts[index])
         # 1.25: a median is less efficient than a mean. The frames between two samples of one point overlap.
         sigma = 1.25 * spread * np.sqrt((1.0 + lags[index] / count) / count)
         floor = np.hypot(models[index].surface_sigma_m_s, noise.pose_position_sigma_m / (lags_s[index] / count))
         motions[index] = SurfaceMotion(
             points=count,
-            moving_share=float(moving[index] / count),
+            moving_points=int(moving[index]),
             velocity_world=R_world_camera @ middle,
             covariance=(R_world_camera * (sigma**2 + floor**2)) @ R_world_camera.T,
         )
@@ -212,10 +220,19 @@ def _lengths(vectors: FloatArray) -> FloatArray:
     return np.hypot(vectors[..., 0], vectors[..., 1])
 
 
-def _median(values: FloatArray) -> FloatArray:
-    """(D,) of each column of values (N, D), N above 0; without the checks of np.median, which take most of its time."""
-    ordered = np.sort(values, axis=0)
-    return np.asarray(0.5 * (ordered[(len(ordered) - 1) // 2] + ordered[len(ordered) // 2]))
+def _gathered(values: FloatArray, owner: npt.NDArray[np.intp], counts: npt.NDArray[np.intp]) -> FloatArray:
+    """(M, K, D) the values (N, D) of each of M owners, `counts` (M,) of them, filled up with infinity."""
+    order = np.argsort(owner, kind="stable")
+    place = np.arange(len(order)) - (np.cumsum(counts) - counts)[owner[order]]
+    gathered = np.full((len(counts), int(counts.max()), values.shape[1]), np.inf)
+    gathered[owner[order], place] = values[order]
+    return gathered
+
+
+def _medians(values: FloatArray, counts: npt.NDArray[np.intp]) -> FloatArray:
+    """(M, D) of the first `counts` (M,), above 0, of values (M, K, D); the others are infinite."""
+    ordered, rows = np.sort(values, axis=1), np.arange(len(counts))
+    return np.asarray(0.5 * (ordered[rows, (counts - 1) // 2] + ordered[rows, counts // 2]))
 
 
 def _full_pixels(half: npt.NDArray[np.float32]) -> FloatArray:
@@ -262,13 +279,12 @@ def _searched(
 
 
 def _inner_region(box_px: FloatArray, mask: npt.NDArray[np.bool_]) -> _Region:
-    height, width = mask.shape
-    left, top = (int(min(max(x, 0), limit)) // _SCALE for x, limit in zip(box_px[:2], (width, height), strict=True))
-    right, bottom = (
-        int(min(max(x, 0), limit - 1)) // _SCALE for x, limit in zip(box_px[2:], (width, height), strict=True)
-    )
-    rows = slice(_SCALE * top, min(_SCALE * (bottom + 1), height // _SCALE * _SCALE), _SCALE)
-    columns = slice(_SCALE * left, min(_SCALE * (right + 1), width // _SCALE * _SCALE), _SCALE)
+    height, width = (length // _SCALE for length in mask.shape)
+    u_min, v_min, u_max, v_max = (int(place) // _SCALE for place in box_px)
+    left, top = max(u_min, _MARGIN_PX), max(v_min, _MARGIN_PX)
+    right, bottom = min(u_max, width - 1 - _MARGIN_PX), min(v_max, height - 1 - _MARGIN_PX)
+    rows = slice(_SCALE * top, _SCALE * max(bottom + 1, top), _SCALE)
+    columns = slice(_SCALE * left, _SCALE * max(right + 1, left), _SCALE)
     part = np.ascontiguousarray(mask[rows, columns]).view(np.uint8)
     inside = cv2.erode(part, _BORDER, borderType=cv2.BORDER_CONSTANT, borderValue=0) if part.size else part
     return _Region(left, top, np.asarray(inside, np.uint8))
@@ -284,6 +300,26 @@ def _owners(pixels: npt.NDArray[np.float32], regions: Sequence[_Region], size: t
     u, v = np.rint(pixels).astype(np.intp).T
     is_in_image = (u >= 0) & (u < size[1]) & (v >= 0) & (v < size[0])
     return np.where(is_in_image, owners.ravel().take(v * size[1] + u, mode="clip"), -1).astype(np.intp)
+
+
+def _is_held(grey: GreyImage, pixels: npt.NDArray[np.float32]) -> npt.NDArray[np.bool_]:
+    """(N,) whether the window around each pixel (N, 2) holds it in all directions: on a stripe it would slide along.
+
+    The smaller eigenvalue of the matrix of Harris and Stephens (1988), summed over the window that is searched for,
+    must be `_LEAST_HOLD` of the larger.
+    """
+    height, width = grey.shape
+    reach = _WINDOW_PX // 2 + 1
+    u, v = np.rint(pixels).astype(np.intp).T
+    u, v = np.clip(u, reach, width - 1 - reach), np.clip(v, reach, height - 1 - reach)
+    offsets = np.arange(-reach, reach + 1)
+    window = grey[(v[:, None] + offsets)[:, :, None], (u[:, None] + offsets)[:, None]].astype(np.float32)
+    across = window[:, 1:-1, 2:] - window[:, 1:-1, :-2]
+    down = window[:, 2:, 1:-1] - window[:, :-2, 1:-1]
+    xx, yy, xy = ((a * b).sum(axis=(1, 2)) for a, b in ((across, across), (down, down), (across, down)))
+    # Eigenvalues of [[xx, xy], [xy, yy]]: m -+ d.
+    m, d = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
+    return np.asarray(m - d > _LEAST_HOLD * (m + d))
 
 
 def _served(counts: Sequence[int], frame_index: int) -> set[int]:
@@ -309,7 +345,13 @@ def _corners(grey: GreyImage, region: _Region, have: npt.NDArray[np.float32], wa
             cv2.circle(free, (int(u), int(v)), distance_px, 0, -1)
     patch = np.ascontiguousarray(grey[region.top : region.top + height, region.left : region.left + width])
     found = cv2.goodFeaturesToTrack(
-        patch, wanted - len(have), _CORNER_QUALITY, distance_px, mask=free, useHarrisDetector=True, k=_HARRIS_K
+        patch,
+        wanted - len(have),
+        _CORNER_QUALITY,
+        distance_px,
+        mask=free,
+        useHarrisDetector=True,
+        k=_HARRIS_K,
     )
     if found is None:
         return np.zeros((0, 2), np.float32)

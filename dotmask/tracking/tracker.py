@@ -65,9 +65,10 @@ def update_tracks(
 ) -> TrackerState:
     """The state after a frame.
 
-    Tracks without an observation keep their prediction and go on moving; after `profile.max_misses` such frames they
-    end, tentative ones at once. Tracks and observations that the gate left over are paired again as if the object had
-    come out from behind something. Observations without a track start one, in the order of the observations.
+    Tracks without an observation keep their prediction and go on moving; after `profile.max_misses` such frames, or
+    `max_misses_idle` if they stood still, they end, tentative ones at once. Tracks and observations that the gate left
+    over are paired again as if the object had come out from behind something. Observations without a track start one,
+    in the order of the observations.
 
     Args:
         predicted: for this frame.
@@ -119,4 +120,7 @@ def _surfaces_of(
 
 def _patience(track: Track, profile: Profile) -> int:
     """With so many misses a track ends."""
-    return 1 if track.phase is TrackPhase.TENTATIVE else profile.max_misses
+    if track.phase is TrackPhase.TENTATIVE:
+        return 1
+    is_idle = track.verdict is not None and not track.verdict.is_moving
+    return profile.max_misses_idle if is_idle else profile.max_misses

@@ -20,7 +20,10 @@ STANDING = rectangle(50, 20, 79, 99)
 
 def surface(share, speed=0.0) -> SurfaceMotion:
     velocity = np.array([0.0, 0.6 * speed, -0.8 * speed])
-    return SurfaceMotion(points=20, moving_share=share, velocity_world=velocity, covariance=np.eye(3))
+    points = 10_000
+    return SurfaceMotion(
+        points=points, moving_points=round(share * points), velocity_world=velocity, covariance=np.eye(3)
+    )
 
 
 def track(
@@ -156,6 +159,17 @@ def test_masks_are_compared_only_between_consecutive_sightings() -> None:
 
 
 # ---- surfaces -----------------------------------------------------------------------------------
+
+
+def test_one_point_alone_lets_nobody_move_but_keeps_a_mover_moving() -> None:
+    """Of 16 points one is more than the share that is asked for; but one may have slipped."""
+    moving = Verdict(is_moving=True, reason=Reason.SURFACE, speed_m_s=0.0, mask_iou=None, calm_frames=3)
+    for verdict, moving_points, flags in ((idle(), 1, False), (idle(), 2, True), (moving, 1, True)):
+        motion = replace(surface(1.0), points=16, moving_points=moving_points)
+        now = replace(track(0.0), surface=motion)
+        answer = classify(now, track(0.0, verdict=verdict), CALIBRATED)
+        assert (answer.is_moving, answer.calm_frames == 0) == (flags, flags), (verdict.reason, moving_points)
+
 
 SHAPES = {
     "same": STANDING,

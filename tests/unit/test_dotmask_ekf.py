@@ -160,7 +160,7 @@ def test_birth_is_at_rest_where_it_was_seen() -> None:
 
 def surface(velocity, covariance) -> SurfaceMotion:
     return SurfaceMotion(
-        points=20, moving_share=1.0, velocity_world=np.asarray(velocity, float), covariance=np.asarray(covariance)
+        points=20, moving_points=20, velocity_world=np.asarray(velocity, float), covariance=np.asarray(covariance)
     )
 
 

@@ -63,7 +63,7 @@ def test_a_detection_without_depth_gives_no_observation() -> None:
 def test_too_few_valid_pixels_give_no_observation_where_the_profile_asks_for_more() -> None:
     depth, mask = wall(), rectangle(100, 60, 160, 150)
     depth[mask] = 0
-    depth[70, 100:120] = 2
+    depth[70, 100 : 99 + CALIBRATED.min_depth_pixels] = 2
     assert len(observe(detect(mask), frame(depth), PAPER)) == 1
     assert observe(detect(mask), frame(depth), CALIBRATED) == ()
 

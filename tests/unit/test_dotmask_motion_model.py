@@ -22,7 +22,7 @@ def track_at(mean, covariance=None, class_name="chair", *, is_partial=False, pha
         mask_position_camera=np.array([0, 0, 1.0]),
         is_partial=is_partial,
         innovation=Innovation(residual=np.zeros(3), covariance=np.eye(3)),
-        surface=SurfaceMotion(points=9, moving_share=0.5, velocity_world=np.ones(3), covariance=np.eye(3)),
+        surface=SurfaceMotion(points=9, moving_points=4, velocity_world=np.ones(3), covariance=np.eye(3)),
     )
 
 

@@ -74,4 +74,9 @@ def test_the_papers_profile_leaves_out_what_is_not_in_the_paper() -> None:
 def test_to_become_moving_asks_for_no_less_of_a_surface_than_to_stay_so() -> None:
     for model in CALIBRATED.classes:
         assert 0 < model.still_moving_share < model.moving_share < 1
-    assert CALIBRATED.max_misses == 90, "three seconds at 30 Hz"
+    assert all(model.moving_points == (2 if model.is_non_rigid else 1) for model in CALIBRATED.classes)
+
+
+def test_tracks_wait_for_three_and_five_seconds_at_30_hz() -> None:
+    assert (CALIBRATED.max_misses, CALIBRATED.max_misses_idle) == (90, 150)
+    assert PAPER.max_misses == PAPER.max_misses_idle

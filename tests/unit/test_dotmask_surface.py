@@ -223,6 +223,31 @@ def test_points_lie_on_the_object_and_keep_two_pixels_off_its_border() -> None:
             assert inner[row, column].all()
 
 
+def test_the_window_around_a_point_lies_in_the_image() -> None:
+    poses = [pose(turn=(0.3 * t, 0.6 * t, 0)) for t in TIMES]
+    frames = [picture(k, T, half_size_m=(2.0, 1.5)) for k, T in enumerate(poses)]
+    assert frames[0][1].masks[0].all(), "the object reaches past all borders"
+    for points in followed(frames, poses):
+        off_px = np.minimum(np.rint(points.pixels), np.array([159, 119]) - np.rint(points.pixels))
+        assert off_px.min() >= 5, "the window has 11 pixels"
+
+
+@pytest.mark.parametrize(("crossing", "has_points"), [(0.0, False), (0.1, False), (1.0, True)])
+def test_no_point_lies_where_it_would_slide_along_a_stripe(crossing, has_points) -> None:
+    """Slanted stripes with sharp sides, crossed by others of a share of their contrast.
+
+    Where a faint one crosses a strong one is a corner, but of the window's matrix the eigenvalues stand as the square
+    of the contrasts.
+    """
+    frame, detections = picture(0, pose())
+    v, u = np.mgrid[0 : CAMERA.height, 0 : CAMERA.width]
+    grey = 127 + 50 * np.sign(np.sin((u + 0.2 * v) / 6)) + 50 * crossing * np.sign(np.sin((v - 0.2 * u) / 6))
+    rgb = np.repeat(np.rint(grey).astype(np.uint8)[..., None], 3, axis=2)
+    [points] = followed([(replace(frame, rgb=rgb), detections)], [pose()])
+    assert (len(points.pixels) > 10) == has_points
+    assert has_points or len(points.pixels) == 0
+
+
 def test_a_points_place_is_its_pixel_at_its_depth() -> None:
     T = pose(turn=(0.1, -0.2, 0.05))
     [points] = followed([picture(0, T)], [T])

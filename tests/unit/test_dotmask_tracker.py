@@ -1,8 +1,10 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from dotmask.profiles import CALIBRATED, PAPER
-from dotmask.records import Intrinsics, Observation, SurfaceMotion, TrackPhase
+from dotmask.records import Intrinsics, Observation, Reason, SurfaceMotion, TrackPhase, Verdict
 from dotmask.tracking.association import Association
 from dotmask.tracking.measurement_model import CAMERA_POINT
 from dotmask.tracking.motion_model import predict
@@ -64,6 +66,20 @@ def test_a_confirmed_track_ends_after_e_frames_without_observation(profile) -> N
         state = step(state, k + misses, profile=profile)
         assert [(t.misses, t.phase, t.hits) for t in state.tracks] == [(misses, TrackPhase.COASTING, k + 1)]
     assert step(state, k + profile.max_misses, profile=profile).tracks == ()
+
+
+@pytest.mark.parametrize("is_moving", [False, True])
+def test_what_stood_still_is_waited_for_longer(is_moving) -> None:
+    state = TrackerState()
+    for k in range(CALIBRATED.confirming_hits):
+        state = step(state, k, ([0, 0, 2], "chair"), profile=CALIBRATED)
+    verdict = Verdict(is_moving=is_moving, reason=Reason.IDLE, speed_m_s=0.0, mask_iou=None)
+    state = replace(state, tracks=tuple(replace(t, verdict=verdict) for t in state.tracks))
+    patience = CALIBRATED.max_misses if is_moving else CALIBRATED.max_misses_idle
+    for misses in range(1, patience):
+        state = step(state, k + misses, profile=CALIBRATED)
+        assert [t.misses for t in state.tracks] == [misses]
+    assert step(state, k + patience, profile=CALIBRATED).tracks == ()
 
 
 @pytest.mark.parametrize("hits", [1, 2])
@@ -180,7 +196,7 @@ def test_the_velocity_of_a_half_hidden_object_that_stands_is_not_dragged_while_i
 
 def test_a_half_hidden_object_that_moves_has_the_velocity_of_its_surface() -> None:
     moves = SurfaceMotion(
-        points=20, moving_share=1.0, velocity_world=np.array([0.3, 0, 0]), covariance=0.03**2 * np.eye(3)
+        points=20, moving_points=20, velocity_world=np.array([0.3, 0, 0]), covariance=0.03**2 * np.eye(3)
     )
     state = TrackerState()
     for k in range(30):
@@ -194,7 +210,7 @@ def test_a_half_hidden_object_that_moves_has_the_velocity_of_its_surface() -> No
 def test_each_track_gets_the_surface_of_its_own_detection() -> None:
     def motion(speed):
         velocity = np.array([speed, 0, 0])
-        return SurfaceMotion(points=20, moving_share=1.0, velocity_world=velocity, covariance=1e-6 * np.eye(3))
+        return SurfaceMotion(points=20, moving_points=20, velocity_world=velocity, covariance=1e-6 * np.eye(3))
 
     objects = [([0, 0, 2], "chair"), ([1, 0, 2], "chair")]
     state = step(TrackerState(), 0, *objects)
