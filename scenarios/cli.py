@@ -119,6 +119,13 @@ def _resolve(
     return _vary(chosen, overrides, seed, frames)
 
 
+def _is_folder(name: str) -> bool:
+    """Whether `name` means a recorded folder: it is a path, or there is no such scenario and such a folder."""
+    from scenarios.registry import SCENARIOS
+
+    return name not in SCENARIOS and (Path(name).is_dir() or "/" in name)
+
+
 @app.command("list")
 def list_scenarios() -> None:
     """The scenarios, one a line.
@@ -204,10 +211,18 @@ def render(
 
 @app.command()
 def run(
-    name: OptionalName = None,
+    name: Annotated[
+        str | None,
+        typer.Argument(help="A scenario (`dotmask list`), or a folder in TUM RGB-D format.", show_default=False),
+    ] = None,
     source: Source = None,
-    methods: Annotated[str, typer.Option(help="Comma-separated: unmasked, mdi, dotmask.")] = "unmasked,mdi,dotmask",
-    segmenter: Annotated[str, typer.Option(help="Segmenter: oracle.")] = "oracle",
+    methods: Annotated[
+        str | None,
+        typer.Option(help="Comma-separated: unmasked, mdi, dotmask. Default: all that have something to mask."),
+    ] = None,
+    segmenter: Annotated[
+        str | None, typer.Option(help="Segmenter: oracle, none. Default: oracle, of a folder none.")
+    ] = None,
     slam: Annotated[str, typer.Option(help="SLAM back end: embedded.")] = "embedded",
     profile: Annotated[
         str, typer.Option(help="Parameters of the method: paper, calibrated. original: as the authors' program is.")
@@ -227,6 +242,10 @@ def run(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print report.json instead of the table.")] = False,
     video: Annotated[bool, typer.Option(help="Write video.mp4: colour, masks, MO-MDI, trajectories.")] = False,
+    camera: Annotated[str | None, typer.Option(help="Camera of a folder: fr1, fr2, fr3. Default: by its name.")] = None,
+    intrinsics: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Camera of a folder: JSON with width, height, fx, fy, cx, cy.")
+    ] = None,
 ) -> None:
     """Render once, run every method on the same bytes, and compare each stage with the truth.
 
@@ -235,15 +254,17 @@ def run(
     dotmask run fr3_walking_xyz --frames 300 --set camera.speed=2 --out runs/fast --expect 'ate_rmse_m<0.03'
 
     dotmask run --from runs/fast/scenario.json --out runs/again
+
+    dotmask run data/rgbd_dataset_freiburg3_walking_xyz
     """
     from scenarios.report import expectation, table, times
-    from scenarios.run import RunSettings, default_out
-    from scenarios.run import run as run_scenario
+    from scenarios.run import RunSettings, default_out, free_folder, run_source
+    from scenarios.sources import Recorded, Simulated, Source
 
-    scenario = _resolve(name, source, overrides, seed, frames)
+    is_folder = source is None and name is not None and _is_folder(name)
     settings = RunSettings.parse(
         methods=methods,
-        segmenter=segmenter,
+        segmenter=segmenter or ("none" if is_folder else "oracle"),
         slam=slam,
         profile=profile,
         pose_feedback=pose_feedback,
@@ -252,10 +273,26 @@ def run(
         video=video,
     )
     expectations = [expectation(text, settings.methods) for text in expect or []]
-    folder = out or default_out(scenario)
+    sequence: Source
+    if is_folder:
+        assert name is not None
+        if overrides or seed is not None:
+            raise ScenarioError(f"{name} is a recorded folder: --set and --seed change scenarios only")
+        sequence = recorded = Recorded(Path(name), camera, intrinsics, frames)
+        folder = out or free_folder(recorded.name)
+        for note in recorded.notes:
+            typer.echo(f"dotmask: {note}", err=True)
+    else:
+        if camera is not None or intrinsics is not None:
+            raise ScenarioError(
+                "--camera and --intrinsics tell the camera of a recorded folder; a scenario has its own"
+            )
+        scenario = _resolve(name, source, overrides, seed, frames)
+        sequence = Simulated(scenario, settings.renderer, settings.threads)
+        folder = out or default_out(scenario)
     with _progress() as progress:
-        task = progress.add_task(f"run {scenario.name}", total=scenario.frames)
-        report = run_scenario(scenario, settings, folder, lambda: progress.advance(task))
+        task = progress.add_task(f"run {sequence.name}", total=len(sequence))
+        report = run_source(sequence, settings, folder, lambda: progress.advance(task))
     if as_json:
         typer.echo(report.to_json(), nl=False)
     else:
