@@ -80,7 +80,8 @@ class PathsPanel:
         """The panel; the scale fits all paths."""
         width, height = self._size
         image = np.full((height, width, 3), BACKGROUND, np.uint8)
-        points = np.array([p for path in self._paths.values() for p in path if p is not None])
+        # The panel shows the origin where there is no position at all.
+        points = np.array([p for path in self._paths.values() for p in path if p is not None] or [np.zeros(2)])
         low, high = points.min(axis=0), points.max(axis=0)
         span = max(float((high - low).max()), 0.2)
         middle = (low + high) / 2

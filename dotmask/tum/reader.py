@@ -57,7 +57,7 @@ def read_sequence(folder: PathLike, camera: RecordedCamera | None = None) -> "Tu
         timestamps_s=colour_s[pairs[:, 0]],
         colour_files=[colour_files[i] for i in pairs[:, 0].tolist()],
         depth_files=[depth_files[j] for j in pairs[:, 1].tolist()],
-        truth=read_trajectory(root / "groundtruth.txt") if (root / "groundtruth.txt").exists() else None,
+        truth=_read_truth(root),
         root=root,
     )
 
@@ -65,15 +65,15 @@ def read_sequence(folder: PathLike, camera: RecordedCamera | None = None) -> "Tu
 class TumSequence:
     """A recorded sequence; `read_sequence` opens one.
 
-    Without `groundtruth.txt` all frames have no true pose. With it, the sequence begins at the first frame that has
-    one, so that it can fix the world of an estimate.
+    Without `groundtruth.txt`, or with an empty one, no frame has a true pose. With it, the sequence begins at the first
+    frame that has one, so that it can fix the world of an estimate.
 
     Attributes:
         root: the folder.
         camera: that took it.
         timestamps_s: (N,) of the frames, rising.
         true_poses: for each frame `T_world_camera` (4, 4) with the nearest stamp, None without one within 0.02 s.
-        has_truth: whether there is a `groundtruth.txt`.
+        has_truth: whether `groundtruth.txt` holds poses.
         notes: what a user should know about the recording, a line each.
     """
 
@@ -143,6 +143,13 @@ class TumSequence:
             depth_m = np.asarray(cv2.remap(depth_m, *self._maps, cv2.INTER_NEAREST), np.float32)
         stamp = float(self.timestamps_s[index])
         return RgbdFrame(index=index, timestamp_s=stamp, rgb=rgb, depth_m=depth_m, intrinsics=intrinsics)
+
+
+def _read_truth(root: Path) -> Trajectory | None:
+    """What `groundtruth.txt` holds, None where it is missing or has no pose."""
+    path = root / "groundtruth.txt"
+    truth = read_trajectory(path) if path.exists() else None
+    return truth if truth is not None and len(truth) else None
 
 
 def _poses_at(times_s: FloatArray, truth: Trajectory | None) -> list[FloatArray | None]:

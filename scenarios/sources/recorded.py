@@ -44,8 +44,10 @@ class Recorded:
         self.renderer: str | None = None
         self.frame_rate_hz: float = self._sequence.frame_rate_hz
         self.oracle: OracleSegmenter | None = None
-        lacks_truth = f"{folder}: no groundtruth.txt: the world is the first camera, and no error is measured"
-        self.notes = (*self._sequence.notes, *([] if self._sequence.has_truth else [lacks_truth]))
+        self.notes = self._sequence.notes
+        if not self._sequence.has_truth:
+            lack = "no true poses in groundtruth.txt: the world is the first camera, and no error is measured"
+            self.notes = (*self.notes, f"{folder}: {lack}")
 
     def __len__(self) -> int:
         """Number of frames."""
