@@ -499,6 +499,64 @@ def validate(
 
 
 @app.command()
+def tables(
+    slam: Annotated[str, typer.Option(help="SLAM back end: embedded.")] = "embedded",
+    segmenter: Annotated[str, typer.Option(help="Segmenter: oracle.")] = "oracle",
+    profile: Annotated[str, typer.Option(help="Parameters of the method: paper, calibrated.")] = "calibrated",
+    quick: Annotated[bool, typer.Option("--quick", help="The first 150 frames of each sequence.")] = False,
+    repeat: Annotated[
+        int | None,
+        typer.Option(help="Runs of each sequence. Default: 5 for rtabmap, which differs from run to run, else 1."),
+    ] = None,
+    threads: Threads = 2,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder of finished runs. Default: runs/tables-SLAM, with --quick -quick.")
+    ] = None,
+    write: Annotated[bool, typer.Option("--write", help="Write docs/results.md of this checkout too.")] = False,
+) -> None:
+    """The paper's Tables II to IV on the six sequences, its figures beside ours.
+
+    A finished run is kept in OUT: after an interruption the same command continues.
+
+    Examples:  dotmask tables --quick
+
+    dotmask tables --slam embedded --write
+    """
+    from scenarios.run import RunSettings
+    from scenarios.tables.layout import METHODS
+    from scenarios.tables.measure import measure
+    from scenarios.tables.page import docs_of_checkout, section_text, write_page
+    from scenarios.tables.plan import TablePlan
+
+    settings = RunSettings.parse(
+        methods=",".join(METHODS), segmenter=segmenter, slam=slam, profile=profile, threads=threads
+    )
+    plan = TablePlan.parse(settings, repeats=repeat, is_quick=quick)
+    pages = [out or Path("runs") / f"tables-{slam}{'-quick' if quick else ''}"]
+    if write:
+        pages.append(docs_of_checkout(plan))
+    with _progress() as progress:
+        task = progress.add_task("tables", total=plan.total_frames())
+        try:
+            reports = measure(
+                plan,
+                pages[0],
+                show=lambda title: progress.update(task, description=title),
+                advance=lambda frames: progress.advance(task, frames),
+            )
+        except KeyboardInterrupt:
+            progress.stop()
+            typer.echo(
+                f"dotmask: interrupted; finished runs are kept in {pages[0]}, the same command continues", err=True
+            )
+            raise typer.Exit(130) from None
+    text = section_text(plan, reports)
+    typer.echo(text)
+    for folder in pages:
+        typer.echo(f"written: {write_page(folder, plan, text)}", err=True)
+
+
+@app.command()
 def doctor() -> None:
     """Check that everything this program needs is here and unharmed.
 
