@@ -30,10 +30,10 @@ def ate_table(reports: Reports) -> str:
             [
                 f"`{name}`",
                 *_ates(runs, lambda m: m.ate_optimised_rmse_m, lambda m: m.optimised_frames),
-                number(paper.rtabmap),
-                number(paper.dotmask),
-                number(paper.improvement_percent),
-                *(number(figure) for figure in (paper.bamvo, paper.sun, paper.dynaslam)),
+                str(paper.rtabmap),
+                str(paper.dotmask),
+                str(paper.improvement_percent),
+                *("-" if figure is None else str(figure) for figure in (paper.bamvo, paper.sun, paper.dynaslam)),
             ]
         )
     return markdown_table(header, rows)
@@ -88,7 +88,7 @@ def _loops(runs: Sequence[Report], method: str) -> list[str]:
 
 
 def _paper_loops(half: PaperLoops) -> list[str]:
-    return [str(half.count), number(half.trans_error_cm), number(half.rot_error_deg)]
+    return [str(half.count), str(half.trans_error_cm), str(half.rot_error_deg)]
 
 
 def time_table(reports: Reports) -> str:
@@ -123,7 +123,7 @@ def _sum(figures: Iterable[float | None]) -> float | None:
 def paper_time_table() -> str:
     """Table IV as it is printed."""
     header = ["paper's Table IV", "image", "CPU", "GPU", "ms"]
-    rows = [[t.approach, t.resolution, t.cpu, t.gpu, f"{t.time_ms:g}"] for t in TABLE_IV]
+    rows = [[t.approach, t.resolution, t.cpu, t.gpu, str(t.time_ms)] for t in TABLE_IV]
     return markdown_table(header, rows, texts=4)
 
 
