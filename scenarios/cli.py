@@ -119,6 +119,13 @@ def _resolve(
     return _vary(chosen, overrides, seed, frames)
 
 
+def _is_folder(name: str) -> bool:
+    """Whether `name` means a recorded folder: it is a path, or there is no such scenario and such a folder."""
+    from scenarios.registry import SCENARIOS
+
+    return name not in SCENARIOS and (Path(name).is_dir() or "/" in name)
+
+
 @app.command("list")
 def list_scenarios() -> None:
     """The scenarios, one a line.
@@ -204,10 +211,18 @@ def render(
 
 @app.command()
 def run(
-    name: OptionalName = None,
+    name: Annotated[
+        str | None,
+        typer.Argument(help="A scenario (`dotmask list`), or a folder in TUM RGB-D format.", show_default=False),
+    ] = None,
     source: Source = None,
-    methods: Annotated[str, typer.Option(help="Comma-separated: unmasked, mdi, dotmask.")] = "unmasked,mdi,dotmask",
-    segmenter: Annotated[str, typer.Option(help="Segmenter: oracle.")] = "oracle",
+    methods: Annotated[
+        str | None,
+        typer.Option(help="Comma-separated: unmasked, mdi, dotmask. Default: all that have something to mask."),
+    ] = None,
+    segmenter: Annotated[
+        str | None, typer.Option(help="Segmenter: oracle, none. Default: oracle, of a folder none.")
+    ] = None,
     slam: Annotated[str, typer.Option(help="SLAM back end: embedded.")] = "embedded",
     profile: Annotated[
         str, typer.Option(help="Parameters of the method: paper, calibrated. original: as the authors' program is.")
@@ -227,6 +242,10 @@ def run(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print report.json instead of the table.")] = False,
     video: Annotated[bool, typer.Option(help="Write video.mp4: colour, masks, MO-MDI, trajectories.")] = False,
+    camera: Annotated[str | None, typer.Option(help="Camera of a folder: fr1, fr2, fr3. Default: by its name.")] = None,
+    intrinsics: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Camera of a folder: JSON with width, height, fx, fy, cx, cy.")
+    ] = None,
 ) -> None:
     """Render once, run every method on the same bytes, and compare each stage with the truth.
 
@@ -235,15 +254,17 @@ def run(
     dotmask run fr3_walking_xyz --frames 300 --set camera.speed=2 --out runs/fast --expect 'ate_rmse_m<0.03'
 
     dotmask run --from runs/fast/scenario.json --out runs/again
+
+    dotmask run data/rgbd_dataset_freiburg3_walking_xyz
     """
     from scenarios.report import expectation, table, times
-    from scenarios.run import RunSettings, default_out
-    from scenarios.run import run as run_scenario
+    from scenarios.run import RunSettings, default_out, free_folder, run_source
+    from scenarios.sources import Recorded, Simulated, Source
 
-    scenario = _resolve(name, source, overrides, seed, frames)
+    is_folder = source is None and name is not None and _is_folder(name)
     settings = RunSettings.parse(
         methods=methods,
-        segmenter=segmenter,
+        segmenter=segmenter or ("none" if is_folder else "oracle"),
         slam=slam,
         profile=profile,
         pose_feedback=pose_feedback,
@@ -252,10 +273,26 @@ def run(
         video=video,
     )
     expectations = [expectation(text, settings.methods) for text in expect or []]
-    folder = out or default_out(scenario)
+    sequence: Source
+    if is_folder:
+        assert name is not None
+        if overrides or seed is not None:
+            raise ScenarioError(f"{name} is a recorded folder: --set and --seed change scenarios only")
+        sequence = recorded = Recorded(Path(name), camera, intrinsics, frames)
+        folder = out or free_folder(recorded.name)
+        for note in recorded.notes:
+            typer.echo(f"dotmask: {note}", err=True)
+    else:
+        if camera is not None or intrinsics is not None:
+            raise ScenarioError(
+                "--camera and --intrinsics tell the camera of a recorded folder; a scenario has its own"
+            )
+        scenario = _resolve(name, source, overrides, seed, frames)
+        sequence = Simulated(scenario, settings.renderer, settings.threads)
+        folder = out or default_out(scenario)
     with _progress() as progress:
-        task = progress.add_task(f"run {scenario.name}", total=scenario.frames)
-        report = run_scenario(scenario, settings, folder, lambda: progress.advance(task))
+        task = progress.add_task(f"run {sequence.name}", total=len(sequence))
+        report = run_source(sequence, settings, folder, lambda: progress.advance(task))
     if as_json:
         typer.echo(report.to_json(), nl=False)
     else:
@@ -459,6 +496,64 @@ def validate(
             advance=lambda: progress.advance(task),
         )
     typer.echo(str(page))
+
+
+@app.command()
+def tables(
+    slam: Annotated[str, typer.Option(help="SLAM back end: embedded.")] = "embedded",
+    segmenter: Annotated[str, typer.Option(help="Segmenter: oracle.")] = "oracle",
+    profile: Annotated[str, typer.Option(help="Parameters of the method: paper, calibrated.")] = "calibrated",
+    quick: Annotated[bool, typer.Option("--quick", help="The first 150 frames of each sequence.")] = False,
+    repeat: Annotated[
+        int | None,
+        typer.Option(help="Runs of each sequence. Default: 5 for rtabmap, which differs from run to run, else 1."),
+    ] = None,
+    threads: Threads = 2,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder of finished runs. Default: runs/tables-SLAM, with --quick -quick.")
+    ] = None,
+    write: Annotated[bool, typer.Option("--write", help="Write docs/results.md of this checkout too.")] = False,
+) -> None:
+    """The paper's Tables II to IV on the six sequences, its figures beside ours.
+
+    A finished run is kept in OUT: after an interruption the same command continues.
+
+    Examples:  dotmask tables --quick
+
+    dotmask tables --slam embedded --write
+    """
+    from scenarios.run import RunSettings
+    from scenarios.tables.layout import METHODS
+    from scenarios.tables.measure import measure
+    from scenarios.tables.page import docs_of_checkout, section_text, write_page
+    from scenarios.tables.plan import TablePlan
+
+    settings = RunSettings.parse(
+        methods=",".join(METHODS), segmenter=segmenter, slam=slam, profile=profile, threads=threads
+    )
+    plan = TablePlan.parse(settings, repeats=repeat, is_quick=quick)
+    pages = [out or Path("runs") / f"tables-{slam}{'-quick' if quick else ''}"]
+    if write:
+        pages.append(docs_of_checkout(plan))
+    with _progress() as progress:
+        task = progress.add_task("tables", total=plan.total_frames())
+        try:
+            reports = measure(
+                plan,
+                pages[0],
+                show=lambda title: progress.update(task, description=title),
+                advance=lambda frames: progress.advance(task, frames),
+            )
+        except KeyboardInterrupt:
+            progress.stop()
+            typer.echo(
+                f"dotmask: interrupted; finished runs are kept in {pages[0]}, the same command continues", err=True
+            )
+            raise typer.Exit(130) from None
+    text = section_text(plan, reports)
+    typer.echo(text)
+    for folder in pages:
+        typer.echo(f"written: {write_page(folder, plan, text)}", err=True)
 
 
 @app.command()

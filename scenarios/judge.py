@@ -28,6 +28,7 @@ from scenarios.report import (
     TrackingReport,
 )
 from scenarios.run_folder import RunFolder
+from scenarios.sources.source import TruePose
 from sim.records import GroundTruth, ObjectTruth
 
 FRAME_COLUMNS = (
@@ -65,32 +66,43 @@ class Judge:
         self._identities: list[FrameIdentities] = []
         self._masks = MaskCounts()
 
-    def see(self, truth: GroundTruth, result: FrameResult, folder: RunFolder) -> None:
-        """Score one frame and append its rows to `frames.csv` and `tracks.csv`."""
-        frame, pose = result.frame, result.pose.T_world_camera
-        self._truth.append((frame.timestamp_s, truth.T_world_camera))
-        self._true_pose_by_frame[frame.index] = truth.T_world_camera
+    def see(self, truth: GroundTruth | TruePose, result: FrameResult, folder: RunFolder) -> None:
+        """Score one frame, as far as its truth is known, and append its rows to `frames.csv` and `tracks.csv`."""
+        frame, pose, true_pose = result.frame, result.pose.T_world_camera, truth.T_world_camera
+        if true_pose is not None:
+            self._truth.append((frame.timestamp_s, true_pose))
+            self._true_pose_by_frame[frame.index] = true_pose
         if pose is not None:
             self._estimate.append((frame.timestamp_s, pose))
         for stage, seconds in result.stage_seconds.items():
             self._seconds[stage].append(seconds)
-        counts = self._see_masks(truth, result)
-        self._see_tracks(truth, result, folder)
-        error = None if pose is None else float(np.linalg.norm(pose[:3, 3] - truth.T_world_camera[:3, 3]))
+        counts: tuple[int | None, ...] = (None,) * 4
+        if isinstance(truth, GroundTruth):
+            counts = self._see_masks(truth, result)
+            self._see_tracks(truth, result, folder)
+        else:
+            self._list_tracks(result, folder)
+        error = None if pose is None or true_pose is None else float(np.linalg.norm(pose[:3, 3] - true_pose[:3, 3]))
         detections = result.front_end.detections
         row = (
             self._method, frame.index, f"{frame.timestamp_s:.6f}", result.pose.status.value, result.pose.inliers,
             _text(error), None if detections is None else len(detections), len(result.front_end.tracks),
-            counts.moving_pixels, counts.leaked_pixels, counts.static_pixels, counts.wasted_pixels,
+            *counts,
         )  # fmt: skip
         folder.append("frames.csv", FRAME_COLUMNS, row)
 
-    def _see_masks(self, truth: GroundTruth, result: FrameResult) -> MaskCounts:
+    def _see_masks(self, truth: GroundTruth, result: FrameResult) -> tuple[int, int, int, int]:
+        """Count, and return the frame's moving, leaked, static and wasted pixels."""
         moving = [actor.instance_id for actor in truth.objects if actor.is_moving]
         masked = result.front_end.masked
         counts = count_masking(result.frame.depth_m, masked.mo_mdi_m, truth.instance_ids, moving)
         self._masks += counts
-        return counts
+        return counts.moving_pixels, counts.leaked_pixels, counts.static_pixels, counts.wasted_pixels
+
+    def _list_tracks(self, result: FrameResult, folder: RunFolder) -> None:
+        """The rows of tracks of which nothing is known."""
+        for track in result.front_end.tracks:
+            folder.append("tracks.csv", TRACK_COLUMNS, self._track_row(result.frame.index, track, None))
 
     def _see_tracks(self, truth: GroundTruth, result: FrameResult, folder: RunFolder) -> None:
         detections = result.front_end.detections
@@ -184,8 +196,12 @@ class Judge:
         )
 
     def _loop_report(self, slam: SlamResult) -> LoopReport:
-        errors = loop_errors(slam.loops, self._true_pose_by_frame)
-        return LoopReport(count=0, false_count=0) if errors is None else LoopReport(**asdict(errors))
+        known = self._true_pose_by_frame
+        judged = [loop for loop in slam.loops if loop.from_index in known and loop.to_index in known]
+        errors = loop_errors(judged, known)
+        if errors is None:
+            return LoopReport(count=len(slam.loops), false_count=None if slam.loops else 0)
+        return LoopReport(**{**asdict(errors), "count": len(slam.loops)})
 
     def _ekf_report(self) -> EkfReport:
         figures = asdict(filter_errors(self._beliefs))

@@ -213,19 +213,34 @@ class MethodReport(Part):
 
 
 class WorldTimes(Part):
-    """Mean wall time per frame in milliseconds of making a frame (rendering, truth, sensor), beside the methods."""
+    """Mean wall time per frame in milliseconds of making a frame (rendering, truth, sensor), beside the methods.
+
+    Null for a recorded sequence.
+    """
 
     render: Measured = None
 
 
 class Report(Part):
-    """`report.json`, schema 1."""
+    """`report.json`, schema 1.
+
+    Attributes:
+        scenario: its name; of a recorded sequence the name of the folder.
+        seed: of the scenario; null for a recorded sequence.
+        frames: how many there were.
+        renderer: that made the images; null for a recorded sequence.
+        segmenter, slam, profile: how it was run.
+        frame_hash: SHA-256 of the colour and depth images as the methods saw them.
+        methods: the figures of each. What needs a truth that there is not (of a recorded sequence all but the
+            trajectory's, without groundtruth.txt these too) is null.
+        time_ms: see WorldTimes.
+    """
 
     schema_version: int = Field(default=1, alias="schema")
     scenario: str
-    seed: int
+    seed: int | None
     frames: int
-    renderer: str
+    renderer: str | None
     segmenter: str
     slam: str
     profile: str
@@ -263,8 +278,9 @@ def _method_ms(times: StageTimes) -> float | None:
 
 def table(report: Report) -> Table:
     """The table of one run: a row a method."""
+    seed = "" if report.seed is None else f"seed {report.seed}, "
     title = (
-        f"{report.scenario}, seed {report.seed}, {report.frames} frames: segmenter {report.segmenter}, "
+        f"{report.scenario}, {seed}{report.frames} frames: segmenter {report.segmenter}, "
         f"SLAM {report.slam}, profile {report.profile}"
     )
     drawn = Table(title=title, title_justify="left", box=SIMPLE, padding=(0, 1, 0, 0), pad_edge=False)
@@ -283,7 +299,8 @@ def times(report: Report) -> str:
         masking = _method_ms(method.time_ms)
         stages = [] if masking is None else [f"masking {masking:.1f}"]
         parts.append(f"{name}: {', '.join([*stages, f'odometry {_number(method.time_ms.odometry)}'])}")
-    return f"ms per frame: render {_number(report.time_ms.render)} (wall); CPU of " + "; ".join(parts)
+    world = "" if report.time_ms.render is None else f"render {_number(report.time_ms.render)} (wall); "
+    return f"ms per frame: {world}CPU of " + "; ".join(parts)
 
 
 COMPARISONS: dict[str, Callable[[float, float], bool]] = {

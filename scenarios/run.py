@@ -1,17 +1,16 @@
-"""Render once, run every method on the same bytes, judge each stage, leave a run folder."""
+"""Make each frame once, run every method on the same bytes, judge each stage, leave a run folder."""
 
 import hashlib
 import json
-import time
-from collections import deque
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import cast, get_args
 
 import cv2
+import numpy as np
 
 from dotmask.interfaces import Segmenter
 from dotmask.original import OriginalDotMask
@@ -21,18 +20,17 @@ from dotmask.profiles import profile as get_profile
 from dotmask.records import FloatArray, RgbdFrame
 from dotmask.slam.embedded import EmbeddedSlam
 from dotmask.tum import format_trajectory
-from scenarios.bridge import rgbd_frame_from_sim
 from scenarios.errors import ScenarioError, unknown
-from scenarios.faults.chain import Faults
 from scenarios.judge import Judge
+from scenarios.no_segmenter import NoSegmenter
 from scenarios.oracle import OracleSegmenter
 from scenarios.report import Report, WorldTimes
 from scenarios.run_folder import RunFolder, versions
+from scenarios.sources import Simulated, Source
 from scenarios.spec import Scenario
 from scenarios.video import PathsPanel, Video, write_picture
-from scenarios.world import RENDERERS, build_simulator
-from sim.records import SimFrame
-from sim.simulator import Simulator
+from scenarios.world import RENDERERS
+from sim.records import GroundTruth
 
 
 def _method(segmenter: Segmenter, chosen: Profile) -> FrontEnd:
@@ -47,16 +45,13 @@ METHODS: dict[str, Callable[[Segmenter, Profile], FrontEnd]] = {
 }
 """What may be compared: raw depth to both, all objects of interest removed from both, the method."""
 
-SEGMENTERS = ("oracle",)
+SEGMENTERS = ("oracle", "none")
 SLAM_BACKENDS = ("embedded",)
-
-FRAMES_AHEAD = 3
-"""Frames rendered ahead of the methods: enough to keep both cores busy, few enough to keep memory flat."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunSettings:
-    """How a scenario is run; what happens in it is the scenario's own business."""
+    """How a sequence is run; what happens in it is the scenario's own business."""
 
     methods: tuple[str, ...]
     segmenter: str
@@ -71,7 +66,7 @@ class RunSettings:
     def parse(
         cls,
         *,
-        methods: str = "unmasked,mdi,dotmask",
+        methods: str | None = None,
         segmenter: str = "oracle",
         slam: str = "embedded",
         profile: str = "calibrated",
@@ -82,10 +77,14 @@ class RunSettings:
     ) -> "RunSettings":
         """Settings from the words of a command line.
 
+        Without `methods` all are run, or with the segmenter `none`, which leaves nothing to mask, `unmasked` alone.
+
         Raises:
-            ScenarioError: a name that does not exist, with near matches.
+            ScenarioError: a name that does not exist, with near matches; or methods that mask without a segmenter.
             dotmask.errors.ProfileError: no such profile.
         """
+        if methods is None:
+            methods = "unmasked" if segmenter == "none" else ",".join(METHODS)
         chosen = tuple(dict.fromkeys(m.strip() for m in methods.split(",") if m.strip()))
         if not chosen:
             raise ScenarioError(f"--methods: name at least one of {', '.join(METHODS)}")
@@ -99,6 +98,8 @@ class RunSettings:
         ):
             if name not in known:
                 raise unknown(kind, name, known)
+        if segmenter == "none" and chosen != ("unmasked",):
+            raise ScenarioError(f"--methods {methods}: without a segmenter nothing is masked; leave only unmasked")
         return cls(
             methods=chosen,
             segmenter=segmenter,
@@ -113,7 +114,12 @@ class RunSettings:
 
 def default_out(scenario: Scenario, prefix: str = "") -> Path:
     """`runs/PREFIXNAME-SEED`, or the first free `runs/PREFIXNAME-SEED-2` and so on."""
-    base = Path("runs") / f"{prefix}{scenario.name}-{scenario.seed}"
+    return free_folder(f"{prefix}{scenario.name}-{scenario.seed}")
+
+
+def free_folder(name: str) -> Path:
+    """`runs/NAME`, or the first free `runs/NAME-2` and so on."""
+    base = Path("runs") / name
     number, path = 1, base
     while path.exists():
         number += 1
@@ -121,95 +127,72 @@ def default_out(scenario: Scenario, prefix: str = "") -> Path:
     return path
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class TimedFrame:
-    """A frame and the wall time that making it took."""
-
-    frame: SimFrame
-    seconds: float
-
-
-def rendered_ahead(simulator: Simulator, first: int = 0) -> Iterator[TimedFrame]:
-    """The frames from `first` on in order, made by a second thread a few frames ahead of the consumer."""
-
-    def make(index: int) -> TimedFrame:
-        start = time.perf_counter()
-        frame = simulator.frame(index)
-        return TimedFrame(frame=frame, seconds=time.perf_counter() - start)
-
-    pending: deque[Future[TimedFrame]] = deque()
-    with ThreadPoolExecutor(max_workers=1, thread_name_prefix="render") as pool:
-        try:
-            for index in range(first, len(simulator)):
-                pending.append(pool.submit(make, index))
-                if len(pending) > FRAMES_AHEAD:
-                    yield pending.popleft().result()
-            while pending:
-                yield pending.popleft().result()
-        finally:
-            for future in pending:
-                future.cancel()
-
-
 def run(scenario: Scenario, settings: RunSettings, out: Path, advance: Callable[[], None]) -> Report:
-    """Run a scenario and write the run folder `out`.
+    """Run a scenario and write the run folder `out`; see `run_source`."""
+    return run_source(Simulated(scenario, settings.renderer, settings.threads), settings, out, advance)
+
+
+def run_source(source: Source, settings: RunSettings, out: Path, advance: Callable[[], None]) -> Report:
+    """Run the methods on the frames of a source and write the run folder `out`.
 
     Args:
-        scenario: what happens.
-        settings: how it is run.
+        source: a simulated scenario or a recorded folder.
+        settings: how it is run; renderer and threads are the source's business.
         out: a new or empty folder.
         advance: called after every frame.
 
     Raises:
         ScenarioError, SimError, DotmaskError: bad input; nothing is left in `out`.
     """
+    segmenter = _segmenter(source, settings)
     with RunFolder(out) as folder, one_opencv_thread(), ThreadPoolExecutor(len(settings.methods)) as pool:
-        folder.write("scenario.json", scenario.to_json())
-        simulator = build_simulator(scenario, settings.renderer, settings.threads)
-        oracle = OracleSegmenter(Faults(scenario))
+        source.describe(folder)
         loops: dict[str, ClosedLoop] = {}
         judges = {name: Judge(name) for name in settings.methods}
-        digest, render_seconds = hashlib.sha256(), 0.0
+        digest, seconds = hashlib.sha256(), 0.0
         paths = PathsPanel(640, 480, settings.methods)
-        video = Video(folder.path / "video.mp4", scenario, settings.methods) if settings.video else None
-        for timed in rendered_ahead(simulator):
-            sim_frame = timed.frame
-            render_seconds += timed.seconds
-            digest.update(sim_frame.rgb.tobytes())
-            digest.update(sim_frame.depth_m.tobytes())
-            frame = rgbd_frame_from_sim(sim_frame)
-            oracle.show(frame.index, sim_frame.truth)
+        video: Video | None = None
+        for timed in source.frames():
+            frame, truth = timed.frame.frame, timed.frame.truth
+            seconds += timed.seconds
+            digest.update(frame.rgb.tobytes())
+            digest.update(frame.depth_m.tobytes())
+            if isinstance(segmenter, OracleSegmenter) and isinstance(truth, GroundTruth):
+                segmenter.show(frame.index, truth)
             if not loops:
                 # The first true pose fixes the world of the estimates, as the alignment of a trajectory would.
-                start = sim_frame.truth.T_world_camera
+                start = np.eye(4) if truth.T_world_camera is None else truth.T_world_camera
                 chosen = get_profile(settings.profile)
                 loops = {
-                    name: closed_loop(METHODS[name](oracle, chosen), settings, frame, start)
+                    name: closed_loop(METHODS[name](segmenter, chosen), settings, frame, start)
                     for name in settings.methods
                 }
+                if settings.video:
+                    size = (frame.intrinsics.width, frame.intrinsics.height)
+                    video = Video(folder.path / "video.mp4", source.frame_rate_hz, size, settings.methods)
             # Each method has its own state, so the order in which they are done cannot matter.
             steps = pool.map(lambda loop, now=frame: loop.step(now), loops.values())
             results = dict(zip(loops, steps, strict=True))
             for name, result in results.items():
-                judges[name].see(sim_frame.truth, result, folder)
-            paths.add(sim_frame, results)
+                judges[name].see(truth, result, folder)
+            paths.add(truth.T_world_camera, results)
             if video is not None:
-                video.add(sim_frame, results, paths)
+                video.add(results, paths)
             advance()
         if video is not None:
             video.close()
         slam_results = {name: loop.finish() for name, loop in loops.items()}
         report = Report(
-            scenario=scenario.name,
-            seed=scenario.seed,
-            frames=len(simulator),
-            renderer=settings.renderer,
+            scenario=source.name,
+            seed=source.seed,
+            frames=len(source),
+            renderer=source.renderer,
             segmenter=settings.segmenter,
             slam=settings.slam,
             profile=settings.profile,
             frame_hash=digest.hexdigest(),
             methods={name: judge.report(slam_results[name]) for name, judge in judges.items()},
-            time_ms=WorldTimes(render=1e3 * render_seconds / len(simulator)),
+            time_ms=WorldTimes(render=None if source.renderer is None else 1e3 * seconds / len(source)),
         )
         folder.write("trajectory_truth.txt", format_trajectory(judges[settings.methods[0]].truth_trajectory()))
         for name, judge in judges.items():
@@ -219,6 +202,21 @@ def run(scenario: Scenario, settings: RunSettings, out: Path, advance: Callable[
         folder.write("versions.json", json.dumps(versions(), indent=2) + "\n")
         folder.write("report.json", report.to_json())
     return report
+
+
+def _segmenter(source: Source, settings: RunSettings) -> Segmenter:
+    """The segmenter of the settings.
+
+    Raises:
+        ScenarioError: it needs the truth, and the source has none.
+    """
+    if settings.segmenter == "none":
+        return NoSegmenter()
+    if source.oracle is None:
+        raise ScenarioError(
+            f"--segmenter oracle: the true masks of {source.name} are not known, it is recorded; use --segmenter none"
+        )
+    return source.oracle
 
 
 def closed_loop(front_end: FrontEnd, settings: RunSettings, first: RgbdFrame, T_world_camera: FloatArray) -> ClosedLoop:

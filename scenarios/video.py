@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from dotmask.pipeline import FrameResult
+from dotmask.records import FloatArray
 from scenarios.errors import ScenarioError
-from scenarios.spec import Scenario
 from sim.records import SimFrame
 
 Picture = npt.NDArray[np.uint8]
@@ -25,9 +25,9 @@ BACKGROUND = (24, 26, 32)
 DEPTH_RANGE_M = (0.5, 5.0)
 
 
-def colour_panel(frame: SimFrame, result: FrameResult) -> Picture:
+def colour_panel(result: FrameResult) -> Picture:
     """The colour image with the detections tinted: red = moving, green = idle, and each track's class, id and speed."""
-    image = frame.rgb.copy()
+    image = result.frame.rgb.copy()
     detections = result.front_end.detections
     if detections is None:
         return image
@@ -69,9 +69,9 @@ class PathsPanel:
         self._size, self._methods = (width, height), methods
         self._paths: dict[str, list[npt.NDArray[np.float64] | None]] = {name: [] for name in ("truth", *methods)}
 
-    def add(self, frame: SimFrame, results: Mapping[str, FrameResult]) -> None:
-        """Append this frame's positions."""
-        self._paths["truth"].append(frame.truth.T_world_camera[:2, 3])
+    def add(self, T_world_camera: FloatArray | None, results: Mapping[str, FrameResult]) -> None:
+        """Append this frame's positions: the true one (4, 4) where it is known, and those of the methods."""
+        self._paths["truth"].append(None if T_world_camera is None else T_world_camera[:2, 3])
         for name in self._methods:
             pose = results[name].pose.T_world_camera
             self._paths[name].append(None if pose is None else pose[:2, 3])
@@ -80,7 +80,8 @@ class PathsPanel:
         """The panel; the scale fits all paths."""
         width, height = self._size
         image = np.full((height, width, 3), BACKGROUND, np.uint8)
-        points = np.array([p for path in self._paths.values() for p in path if p is not None])
+        # The panel shows the origin where there is no position at all.
+        points = np.array([p for path in self._paths.values() for p in path if p is not None] or [np.zeros(2)])
         low, high = points.min(axis=0), points.max(axis=0)
         span = max(float((high - low).max()), 0.2)
         middle = (low + high) / 2
@@ -154,33 +155,38 @@ class VideoFile:
 class Video:
     """Writes the mosaic of every frame of a run to an mp4 file.
 
+    Args:
+        path: of the file.
+        rate_hz: pictures a second.
+        size: width and height of the frames.
+        methods: that are run; `dotmask` is shown, without it the last one.
+
     Raises:
         ScenarioError: OpenCV has no encoder for it here.
     """
 
-    def __init__(self, path: Path, scenario: Scenario, methods: tuple[str, ...]) -> None:
+    def __init__(self, path: Path, rate_hz: float, size: tuple[int, int], methods: tuple[str, ...]) -> None:
         self._shown = "dotmask" if "dotmask" in methods else methods[-1]
-        size = (3 * scenario.camera.width // 2, 3 * scenario.camera.height // 2)
-        self._file = VideoFile(path, scenario.frame_rate_hz, size)
+        self._file = VideoFile(path, rate_hz, (3 * size[0] // 2, 3 * size[1] // 2))
 
-    def add(self, frame: SimFrame, results: Mapping[str, FrameResult], paths: PathsPanel) -> None:
+    def add(self, results: Mapping[str, FrameResult], paths: PathsPanel) -> None:
         """Append one frame; `paths` holds the positions up to it."""
-        self._file.add(frame_picture(frame, results[self._shown], paths))
+        self._file.add(frame_picture(results[self._shown], paths))
 
     def close(self) -> None:
         """Finish the file."""
         self._file.close()
 
 
-def frame_picture(frame: SimFrame, result: FrameResult, paths: PathsPanel) -> Picture:
+def frame_picture(result: FrameResult, paths: PathsPanel) -> Picture:
     """The mosaic of one frame."""
-    masked = result.front_end.masked
+    masked, (height, width) = result.front_end.masked, result.frame.depth_m.shape
     return mosaic(
         [
-            ("red: moving, green: idle", colour_panel(frame, result)),
+            ("red: moving, green: idle", colour_panel(result)),
             ("MO-MDI, to odometry", depth_panel(masked.mo_mdi_m)),
             ("MDI, to the map", depth_panel(masked.mdi_m)),
-            ("", np.asarray(cv2.resize(paths.draw(), frame.rgb.shape[1::-1], interpolation=cv2.INTER_AREA), np.uint8)),
+            ("", np.asarray(cv2.resize(paths.draw(), (width, height), interpolation=cv2.INTER_AREA), np.uint8)),
         ]
     )
 

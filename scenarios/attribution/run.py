@@ -25,8 +25,9 @@ from scenarios.faults.chain import Faults
 from scenarios.judge import Judge
 from scenarios.oracle import OracleSegmenter
 from scenarios.plots import Scatter, draw_scatters
-from scenarios.run import RunSettings, closed_loop, one_opencv_thread, rendered_ahead
+from scenarios.run import RunSettings, closed_loop, one_opencv_thread
 from scenarios.run_folder import RunFolder, versions
+from scenarios.sources import rendered_ahead
 from scenarios.spec import Scenario
 from scenarios.world import build_simulator
 from sim.records import GroundTruth

@@ -12,8 +12,8 @@ from scenarios.export.kitti import KittiExport
 from scenarios.export.truth import TruthFiles
 from scenarios.export.tum import TumExport
 from scenarios.export.video import VideoExport
-from scenarios.run import rendered_ahead
 from scenarios.run_folder import versions
+from scenarios.sources import rendered_ahead
 from scenarios.spec import Scenario
 from scenarios.world import build_simulator
 from sim.records import SimFrame

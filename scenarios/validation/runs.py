@@ -17,8 +17,9 @@ from scenarios.oracle import OracleSegmenter
 from scenarios.registry import RENDERED_AS
 from scenarios.registry import scenario as scenario_by_name
 from scenarios.report import MethodReport
-from scenarios.run import METHODS, one_opencv_thread, rendered_ahead
+from scenarios.run import METHODS, one_opencv_thread
 from scenarios.run_folder import RunFolder
+from scenarios.sources import rendered_ahead
 from scenarios.spec import Scenario, with_overrides
 from scenarios.world import build_simulator
 from sim.records import SimFrame

@@ -48,7 +48,9 @@ def smoke_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_run_folder_is_complete_and_readable(smoke_run: Path) -> None:
     assert sorted(p.name for p in smoke_run.iterdir()) == [
         "frames.csv", "report.json", "scenario.json", "tracks.csv", "trajectories.png", "trajectory_dotmask.txt",
-        "trajectory_mdi.txt", "trajectory_truth.txt", "trajectory_unmasked.txt", "versions.json", "video.mp4",
+        "trajectory_dotmask_optimised.txt", "trajectory_mdi.txt", "trajectory_mdi_optimised.txt",
+        "trajectory_truth.txt", "trajectory_unmasked.txt", "trajectory_unmasked_optimised.txt",
+        "versions.json", "video.mp4",
     ]  # fmt: skip
     report = Report.model_validate_json((smoke_run / "report.json").read_text())
     assert list(report.methods) == ["unmasked", "mdi", "dotmask"]

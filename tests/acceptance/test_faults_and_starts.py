@@ -14,8 +14,9 @@ from scenarios.judge import Judge
 from scenarios.oracle import OracleSegmenter
 from scenarios.registry import scenario
 from scenarios.report import MethodReport
-from scenarios.run import RunSettings, one_opencv_thread, rendered_ahead, run
+from scenarios.run import RunSettings, one_opencv_thread, run
 from scenarios.run_folder import RunFolder
+from scenarios.sources import rendered_ahead
 from scenarios.spec import with_overrides
 from scenarios.world import build_simulator
 

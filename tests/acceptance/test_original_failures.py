@@ -16,7 +16,8 @@ from dotmask.slam.embedded import EmbeddedSlam
 from scenarios.bridge import rgbd_frame_from_sim
 from scenarios.oracle import MIN_PIXELS, OracleSegmenter
 from scenarios.registry import scenario
-from scenarios.run import METHODS, one_opencv_thread, rendered_ahead
+from scenarios.run import METHODS, one_opencv_thread
+from scenarios.sources import rendered_ahead
 from scenarios.world import build_simulator
 from sim.records import GroundTruth, ObjectTruth
 

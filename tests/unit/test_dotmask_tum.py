@@ -13,9 +13,12 @@ from dotmask.records import Intrinsics, RgbdFrame, Trajectory
 from dotmask.timestamps import nearest_pairs
 from dotmask.tum import (
     MAX_DEPTH_M,
+    PUBLISHED,
+    RecordedCamera,
     TumSequenceWriter,
+    find_camera,
     format_trajectory,
-    read_intrinsics,
+    read_camera,
     read_sequence,
     read_trajectory,
     write_trajectory,
@@ -54,6 +57,15 @@ def write_example(folder: Path, count: int = 3) -> list[RgbdFrame]:
         writer.write(one, pose)
     growing.finish()
     return frames
+
+
+FIRST = "rgb/1000.000000.png"
+
+
+def flipped(data: bytes) -> bytes:
+    """One bit in the middle changed."""
+    middle = len(data) // 2
+    return data[:middle] + bytes([data[middle] ^ 1]) + data[middle + 1 :]
 
 
 def lines(text: str) -> str:
@@ -209,15 +221,15 @@ def test_reader_pairs_the_nearest_stamps(tmp_path):
 
 def test_reader_takes_intrinsics_where_the_folder_has_none(tmp_path):
     write_example(tmp_path / "seq")
-    assert read_intrinsics(tmp_path / "seq") == CAMERA
+    assert read_camera(tmp_path / "seq" / "camera.json").intrinsics == CAMERA
     (tmp_path / "seq" / "camera.json").unlink()
-    with pytest.raises(SequenceFolderError, match="give the intrinsics"):
+    with pytest.raises(SequenceFolderError, match="give --camera fr1, fr2, fr3 or --intrinsics FILE"):
         read_sequence(tmp_path / "seq")
     other = Intrinsics(width=8, height=6, fx=1.0, fy=1.0, cx=0.0, cy=0.0)
-    assert next(read_sequence(tmp_path / "seq", other)).intrinsics == other
-    larger = Intrinsics(width=640, height=480, fx=1.0, fy=1.0, cx=0.0, cy=0.0)
-    with pytest.raises(SequenceFolderError, match=r"8 x 6 pixels, the intrinsics say 640 x 480"):
-        next(read_sequence(tmp_path / "seq", larger))
+    given = RecordedCamera(intrinsics=other, source="mine")
+    assert read_sequence(tmp_path / "seq", given).frame(0).intrinsics == other
+    with pytest.raises(SequenceFolderError, match=r"8 x 6 pixels, camera fr3 has 640 x 480"):
+        read_sequence(tmp_path / "seq", PUBLISHED["fr3"]).frame(0)
 
 
 @pytest.mark.parametrize(
@@ -225,10 +237,28 @@ def test_reader_takes_intrinsics_where_the_folder_has_none(tmp_path):
     [
         (lambda root: (root / "rgb.txt").unlink(), "rgb.txt: no such file"),
         (lambda root: (root / "rgb.txt").write_text("1.0\n"), "rgb.txt:1: expected 2 columns"),
-        (lambda root: (root / "rgb.txt").write_text("5.0 rgb/x.png\n"), "no colour and depth image within"),
-        (lambda root: (root / "rgb/1000.000000.png").unlink(), "cannot be read"),
-        (lambda root: (root / "rgb/1000.000000.png").write_bytes(b""), "is not an image"),
-        (lambda root: (root / "depth/1000.000000.png").write_bytes(b"no"), "is not an image"),
+        (lambda root: (root / "rgb.txt").write_text(f"5.0 {FIRST}\n"), "no colour and depth image within 0.02 s"),
+        (lambda root: (root / "rgb.txt").write_text("# empty\n"), "rgb.txt: lists no image"),
+        (lambda root: (root / FIRST).unlink(), f"rgb.txt:2: .*{FIRST} does not exist"),
+        (
+            lambda root: (root / "rgb.txt").write_text(f"2 {FIRST}\n1 {FIRST}\n"),
+            "rgb.txt:2: time 1 is before 2.0+; sort",
+        ),
+        (lambda root: (root / "rgb.txt").write_text(f"2 {FIRST}\n2 {FIRST}\n"), "rgb.txt:2: time 2 stands there twice"),
+        (lambda root: (root / "depth.txt").write_text("2 ../seq/depth.txt\n"), "depth.txt:1: ../seq.* leads out of"),
+        (
+            lambda root: (root / "depth.txt").write_text(f"2 {root}/{FIRST}\n"),
+            "depth.txt:1: .* leads out of the folder",
+        ),
+        (lambda root: (root / FIRST).write_bytes(b""), f"{FIRST}: is not a PNG image"),
+        (lambda root: (root / FIRST).write_bytes((root / FIRST).read_bytes()[:-20]), f"{FIRST}: is cut off"),
+        (lambda root: (root / FIRST).write_bytes(flipped((root / FIRST).read_bytes())), f"{FIRST}: is damaged"),
+        (
+            lambda root: cv2.imwrite(str(root / FIRST), np.zeros((5, 8, 3), np.uint8)),
+            "depth/.* is 8 x 6 pixels, .* is 8 x 5",
+        ),
+        (lambda root: (root / "groundtruth.txt").write_text("7 0 0 0 0 0 0 1\n"), "groundtruth.txt: no pose within"),
+        (lambda root: (root / "depth/1000.000000.png").write_bytes(b"no"), "is not a PNG image"),
         (lambda root: cv2.imwrite(str(root / "depth/1000.000000.png"), np.zeros((6, 8), np.uint8)), "16 bits"),
         (lambda root: cv2.imwrite(str(root / "rgb/1000.000000.png"), np.zeros((6, 8), np.uint8)), "8 bits"),
         (lambda root: (root / "camera.json").write_text("[]"), "camera.json: cannot be read"),
@@ -239,7 +269,7 @@ def test_broken_sequence_is_named(tmp_path, change, message):
     write_example(tmp_path / "seq")
     change(tmp_path / "seq")
     with pytest.raises(SequenceFolderError, match=message):
-        next(read_sequence(tmp_path / "seq"))
+        read_sequence(tmp_path / "seq").frame(0)
 
 
 def test_other_depth_scale_is_refused(tmp_path):
@@ -250,6 +280,94 @@ def test_other_depth_scale_is_refused(tmp_path):
         read_sequence(tmp_path / "seq")
     with pytest.raises(SequenceFolderError, match="no such folder"):
         read_sequence(tmp_path / "none")
+
+
+def test_camera_is_known_by_name_by_file_and_by_the_folder(tmp_path):
+    for name, wanted in (
+        ("rgbd_dataset_freiburg3_walking_xyz", "fr3"),
+        ("rgbd_dataset_freiburg1_desk2", "fr1"),
+        ("fr2_desk", "fr2"),
+        ("my-FR3", "fr3"),
+    ):
+        assert find_camera(tmp_path / name) == PUBLISHED[wanted]
+    for name in ("fr30", "walking", "afr3", "freiburg4_xyz"):
+        with pytest.raises(SequenceFolderError, match=r"neither camera\.json nor the name of the folder"):
+            find_camera(tmp_path / name)
+    assert find_camera(tmp_path / "fr1_desk", "fr2") == PUBLISHED["fr2"]
+    with pytest.raises(SequenceFolderError, match="unknown camera 'fr4'; known: fr1, fr2, fr3"):
+        find_camera(tmp_path, "fr4")
+    with pytest.raises(SequenceFolderError, match="not both"):
+        find_camera(tmp_path, "fr3", tmp_path / "camera.json")
+    (tmp_path / "mine.json").write_text('{"width": 8, "height": 6, "fx": 1, "fy": 2, "cx": 3, "cy": 4}')
+    assert find_camera(tmp_path / "fr1_desk", file=tmp_path / "mine.json").intrinsics.fy == 2.0
+    with pytest.raises(SequenceFolderError, match=r"none\.json: no such file"):
+        read_camera(tmp_path / "none.json")
+    (tmp_path / "mine.json").write_text('{"width": 8, "height": 6, "fx": 1, "fy": 2, "cx": 3, "cy": NaN}')
+    with pytest.raises(SequenceFolderError, match="not finite"):
+        read_camera(tmp_path / "mine.json")
+
+
+def test_a_straight_line_in_the_world_is_straight_after_the_lens(tmp_path):
+    # Where the lens of fr1 shows each point of a plane, by the formula of Brown and Conrady, not by OpenCV.
+    camera = PUBLISHED["fr1"]
+    k1, k2, p1, p2, k3 = camera.distortion
+    K = camera.intrinsics
+    v, u = np.mgrid[0:480, 0:640].astype(float)
+    # The plane is dark left of x = x_line and bright right of it; the lens is inverted by iteration.
+    xd, yd = (u - K.cx) / K.fx, (v - K.cy) / K.fy
+    x, y = xd.copy(), yd.copy()
+    for _ in range(50):
+        r2 = x * x + y * y
+        radial = 1 + k1 * r2 + k2 * r2**2 + k3 * r2**3
+        x = (xd - 2 * p1 * x * y - p2 * (r2 + 2 * x * x)) / radial
+        y = (yd - p1 * (r2 + 2 * y * y) - 2 * p2 * x * y) / radial
+    x_line = 0.42
+    bright = x > x_line
+    rgb = np.repeat((255 * bright).astype(np.uint8)[..., None], 3, axis=2)
+    depth_m = np.where(bright, 2.0, 1.0).astype(np.float32)
+    folder = PartialFolder.create(tmp_path / "fr1", {})
+    writer = TumSequenceWriter(folder.files, K)
+    writer.begin()
+    writer.write(RgbdFrame(index=0, timestamp_s=0.0, rgb=rgb, depth_m=depth_m, intrinsics=K))
+    folder.finish()
+    straight = read_sequence(tmp_path / "fr1", camera).frame(0)
+    wanted = K.fx * x_line + K.cx
+    rows = slice(60, 420)
+    edges = np.argmax(straight.rgb[rows, :, 0] > 127, axis=1)
+    assert np.abs(edges - wanted).max() < 1.5
+    bent = np.argmax(rgb[rows, :, 0] > 127, axis=1)
+    assert np.abs(bent - wanted).max() > 3, "without the correction the line is bent"
+    assert set(np.unique(straight.depth_m)) <= {0.0, 1.0, 2.0}, "depths are not mixed"
+
+
+def test_a_sequence_begins_with_its_first_true_pose_and_notes_what_is_odd(tmp_path):
+    write_example(tmp_path / "seq", 6)
+    root = tmp_path / "seq"
+    truth = (root / "groundtruth.txt").read_text().splitlines()
+    (root / "groundtruth.txt").write_text("\n".join([truth[0], *truth[3:5], truth[6]]))
+    sequence = read_sequence(root)
+    assert len(sequence) == 4
+    assert sequence.frame(0).index == 0
+    assert sequence.frame(0).timestamp_s == pytest.approx(1000 + 2 / 30, abs=1e-6)
+    assert [pose is None for pose in sequence.true_poses] == [False, False, True, False]
+    np.testing.assert_allclose(sequence.true_poses[0], random_trajectory(1, 6).T_world_camera[2], atol=1e-14)
+    assert "the first 2 frames are left out" in sequence.notes[0]
+    assert "1 of 4 frames have no true pose" in sequence.notes[1]
+    (root / "groundtruth.txt").unlink()
+    assert read_sequence(root).true_poses == (None,) * 6
+    assert read_sequence(root).notes == ()
+
+
+def test_long_gaps_are_noted(tmp_path):
+    write_example(tmp_path / "seq", 4)
+    root = tmp_path / "seq"
+    (root / "groundtruth.txt").unlink()
+    for name in ("rgb", "depth"):
+        rows = [line.split() for line in (root / f"{name}.txt").read_text().splitlines()[1:]]
+        shifted = [f"{float(t) + (k >= 1) * 2 + (k >= 3) * 1.5:.6f} {file}" for k, (t, file) in enumerate(rows)]
+        (root / f"{name}.txt").write_text("\n".join(shifted))
+    (note,) = read_sequence(root).notes
+    assert "no frame for 2.0 s after 1000.000000, and 1 more gaps over 1 s" in note
 
 
 def test_file_has_a_header_and_positive_w():

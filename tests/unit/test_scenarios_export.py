@@ -15,7 +15,7 @@ from pycocotools.coco import COCO
 from scipy.spatial.transform import Rotation
 
 from dotmask.partial_folder import GrowingFiles, PartialFolder
-from dotmask.tum import read_intrinsics, read_sequence, read_trajectory
+from dotmask.tum import read_camera, read_sequence, read_trajectory
 from scenarios.export.coco import CocoExport
 from scenarios.export.coco_names import CATEGORY_IDS, KEYPOINTS, SKELETON, supercategory
 from scenarios.export.json_list import JsonList
@@ -169,7 +169,7 @@ def test_tum_folder(tmp_path: Path) -> None:
     assert (root / "instance.txt").read_text().splitlines()[1] == "0.000000 instance/0.000000.png"
     truth = read_trajectory(root / "groundtruth.txt")
     np.testing.assert_allclose(truth.T_world_camera, [pose(k) for k in range(3)], atol=1e-12)
-    assert read_intrinsics(root).fy == 11.0
+    assert read_camera(root / "camera.json").intrinsics.fy == 11.0
     camera = json.loads((root / "camera.json").read_text())
     assert camera["depth_per_metre"] == 5000
     assert camera["sensor"] == {"model": "ideal"}

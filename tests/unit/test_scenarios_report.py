@@ -16,6 +16,7 @@ from scenarios.report import (
     WorldTimes,
     expectation,
     table,
+    times,
 )
 
 METHODS = ("unmasked", "dotmask")
@@ -82,7 +83,9 @@ def test_report_json_follows_the_contract() -> None:
     ]  # fmt: skip
     assert list(dotmask["masks"]) == ["iou", "boundary_f", "leak", "waste"]
     assert list(dotmask["map"]) == ["ghost_fraction", "accuracy_m", "completeness"]
-    assert list(dotmask["loops"]) == ["count", "false_count", "trans_error_m", "trans_error_max_m", "rot_error_rad"]
+    assert list(dotmask["loops"]) == [
+        "count", "false_count", "trans_error_m", "trans_error_max_m", "rot_error_rad",
+    ]  # fmt: skip
     assert list(dotmask["time_ms"]) == ["segment", "track", "classify", "mask", "odometry", "map"]
 
 
@@ -147,3 +150,11 @@ def test_the_table_has_a_row_a_method_and_a_dash_for_what_is_not_there() -> None
     assert "200.0" in text
     unmasked = next(line for line in text.splitlines() if "unmasked" in line)
     assert " - " in unmasked
+
+
+def test_a_recorded_sequence_has_neither_seed_nor_renderer() -> None:
+    recorded = REPORT.model_copy(update={"seed": None, "renderer": None, "time_ms": WorldTimes()})
+    tree = json.loads(recorded.to_json())
+    assert (tree["seed"], tree["renderer"], tree["time_ms"]) == (None, None, {"render": None})
+    assert table(recorded).title == "smoke, 10 frames: segmenter oracle, SLAM embedded, profile paper"
+    assert times(recorded).startswith("ms per frame: CPU of unmasked: odometry 12.0")

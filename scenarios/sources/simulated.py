@@ -1,0 +1,53 @@
+"""Frames of a scenario, rendered as they are asked for."""
+
+from collections.abc import Iterator
+
+from scenarios.bridge import rgbd_frame_from_sim
+from scenarios.faults.chain import Faults
+from scenarios.oracle import OracleSegmenter
+from scenarios.run_folder import RunFolder
+from scenarios.sources.ahead import Timed, made_ahead
+from scenarios.sources.source import SourceFrame
+from scenarios.spec import Scenario
+from scenarios.world import build_simulator
+
+
+class Simulated:
+    """A scenario as a source of frames; see `Source`.
+
+    Args:
+        scenario: what happens.
+        renderer: name of the renderer.
+        threads: of the renderer.
+    """
+
+    def __init__(self, scenario: Scenario, renderer: str, threads: int) -> None:
+        self._scenario, self._threads = scenario, threads
+        self.name: str = scenario.name
+        self.seed: int | None = scenario.seed
+        self.renderer: str | None = renderer
+        self.frame_rate_hz: float = scenario.frame_rate_hz
+        self.oracle: OracleSegmenter | None = OracleSegmenter(Faults(scenario))
+
+    def __len__(self) -> int:
+        """Number of frames."""
+        return self._scenario.frames
+
+    def frames(self) -> Iterator[Timed[SourceFrame]]:
+        """See `Source`.
+
+        Raises:
+            SimError, ScenarioError: the scenario's world cannot be built.
+        """
+        assert self.renderer is not None
+        simulator = build_simulator(self._scenario, self.renderer, self._threads)
+
+        def make(index: int) -> SourceFrame:
+            frame = simulator.frame(index)
+            return SourceFrame(frame=rgbd_frame_from_sim(frame), truth=frame.truth)
+
+        return made_ahead(make, range(len(self)))
+
+    def describe(self, folder: RunFolder) -> None:
+        """Write `scenario.json`, which `--from` repeats."""
+        folder.write("scenario.json", self._scenario.to_json())
