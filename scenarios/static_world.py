@@ -1,0 +1,49 @@
+"""What a map should look like: the surface of all that cannot move, and how it looks from anywhere."""
+
+import numpy as np
+import trimesh
+
+from dotmask.evaluation.mapping import SurfaceSamples
+from dotmask.records import FloatArray
+from scenarios.bridge import intrinsics_from_camera
+from sim.records import CameraModel, Moment
+from sim.renderers.visibility_buffer import VisibilityBufferRenderer
+from sim.scene import Scene
+
+SPACING_M = 0.02
+
+
+class StaticWorld:
+    """A scene without its actors.
+
+    Args:
+        scene: the whole scene.
+        camera: of the images.
+    """
+
+    def __init__(self, scene: Scene, camera: CameraModel) -> None:
+        self._scene = Scene(objects=tuple(o for o in scene.objects if not o.is_actor), lights=())
+        # Depth alone is asked for, so it needs neither light nor the run's own renderer.
+        self._renderer = VisibilityBufferRenderer(self._scene, camera, shadow_size=0)
+        self.intrinsics = intrinsics_from_camera(camera)
+
+    def depth_m(self, T_world_camera: FloatArray) -> np.ndarray:
+        """(H, W) float32 true depth from a pose (4, 4), metres, 0 = nothing hit."""
+        return self._renderer.render(Moment(T_world_camera=T_world_camera, palettes={})).depth_m
+
+    def samples(self) -> SurfaceSamples:
+        """Points on all its surfaces, one for each square of SPACING_M in the mean; the same ones every time."""
+        meshes = []
+        for thing in self._scene.objects:
+            T_world_object = thing.motion.palette_at(0.0)[0]
+            for surface in thing.surfaces:
+                mesh = trimesh.Trimesh(surface.vertices, surface.faces, process=False)
+                meshes.append(mesh.apply_transform(T_world_object))
+        whole = trimesh.util.concatenate(meshes)
+        count = max(int(whole.area / SPACING_M**2), 1)
+        points, faces = trimesh.sample.sample_surface(whole, count, seed=0)
+        return SurfaceSamples(
+            points_m=np.asarray(points, np.float64),
+            normals=np.asarray(whole.face_normals[faces], np.float64),
+            spacing_m=SPACING_M,
+        )
