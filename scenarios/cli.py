@@ -227,6 +227,9 @@ def run(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print report.json instead of the table.")] = False,
     video: Annotated[bool, typer.Option(help="Write video.mp4: colour, masks, MO-MDI, trajectories.")] = False,
+    with_map: Annotated[
+        bool, typer.Option("--map", help="Build, judge and draw the maps: map_METHOD.ply, mesh_METHOD.ply, map.png.")
+    ] = False,
 ) -> None:
     """Render once, run every method on the same bytes, and compare each stage with the truth.
 
@@ -234,9 +237,11 @@ def run(
 
     dotmask run fr3_walking_xyz --frames 300 --set camera.speed=2 --out runs/fast --expect 'ate_rmse_m<0.03'
 
+    dotmask run fr3_walking_xyz --methods unmasked,dotmask --map --out runs/mapped
+
     dotmask run --from runs/fast/scenario.json --out runs/again
     """
-    from scenarios.report import expectation, table, times
+    from scenarios.report import expectation, maps, table, times
     from scenarios.run import RunSettings, default_out
     from scenarios.run import run as run_scenario
 
@@ -250,6 +255,7 @@ def run(
         renderer=renderer,
         threads=threads,
         video=video,
+        with_map=with_map,
     )
     expectations = [expectation(text, settings.methods) for text in expect or []]
     folder = out or default_out(scenario)
@@ -261,6 +267,9 @@ def run(
     else:
         _console().print(table(report))
         _console().print(times(report), highlight=False)
+        of_maps = maps(report)
+        if of_maps is not None:
+            _console().print(of_maps, highlight=False)
         _console().print(f"frame hash {report.frame_hash[:16]}, results in {folder}", highlight=False)
     missed = False
     for wanted in expectations:

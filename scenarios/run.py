@@ -9,11 +9,12 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import cast, get_args
+from typing import TYPE_CHECKING, cast, get_args
 
 import cv2
 
 from dotmask.interfaces import Segmenter
+from dotmask.mapping.settings import MappingSettings
 from dotmask.original import OriginalDotMask
 from dotmask.pipeline import ClosedLoop, DotMask, FrontEnd, MaskAll, Unmasked
 from dotmask.profiles import ORIGINAL, PoseFeedback, Profile
@@ -33,6 +34,9 @@ from scenarios.video import PathsPanel, Video, write_picture
 from scenarios.world import RENDERERS, build_simulator
 from sim.records import SimFrame
 from sim.simulator import Simulator
+
+if TYPE_CHECKING:
+    from scenarios.mapping import MapMaker
 
 
 def _method(segmenter: Segmenter, chosen: Profile) -> FrontEnd:
@@ -66,6 +70,7 @@ class RunSettings:
     renderer: str
     threads: int
     video: bool
+    with_map: bool
 
     @classmethod
     def parse(
@@ -79,6 +84,7 @@ class RunSettings:
         renderer: str = "numba",
         threads: int = 2,
         video: bool = False,
+        with_map: bool = False,
     ) -> "RunSettings":
         """Settings from the words of a command line.
 
@@ -108,6 +114,7 @@ class RunSettings:
             renderer=renderer,
             threads=threads,
             video=video,
+            with_map=with_map,
         )
 
 
@@ -171,6 +178,7 @@ def run(scenario: Scenario, settings: RunSettings, out: Path, advance: Callable[
         judges = {name: Judge(name) for name in settings.methods}
         digest, render_seconds = hashlib.sha256(), 0.0
         paths = PathsPanel(640, 480, settings.methods)
+        maker = _map_maker(simulator, settings) if settings.with_map else None
         video = Video(folder.path / "video.mp4", scenario, settings.methods) if settings.video else None
         for timed in rendered_ahead(simulator):
             sim_frame = timed.frame
@@ -192,6 +200,8 @@ def run(scenario: Scenario, settings: RunSettings, out: Path, advance: Callable[
             results = dict(zip(loops, steps, strict=True))
             for name, result in results.items():
                 judges[name].see(sim_frame.truth, result, folder)
+            if maker is not None:
+                maker.see(sim_frame.truth, results)
             paths.add(sim_frame, results)
             if video is not None:
                 video.add(sim_frame, results, paths)
@@ -199,6 +209,7 @@ def run(scenario: Scenario, settings: RunSettings, out: Path, advance: Callable[
         if video is not None:
             video.close()
         slam_results = {name: loop.finish() for name, loop in loops.items()}
+        of_maps = {} if maker is None else maker.finish(slam_results, folder)
         report = Report(
             scenario=scenario.name,
             seed=scenario.seed,
@@ -208,7 +219,7 @@ def run(scenario: Scenario, settings: RunSettings, out: Path, advance: Callable[
             slam=settings.slam,
             profile=settings.profile,
             frame_hash=digest.hexdigest(),
-            methods={name: judge.report(slam_results[name]) for name, judge in judges.items()},
+            methods={name: judge.report(slam_results[name], of_maps.get(name)) for name, judge in judges.items()},
             time_ms=WorldTimes(render=1e3 * render_seconds / len(simulator)),
         )
         folder.write("trajectory_truth.txt", format_trajectory(judges[settings.methods[0]].truth_trajectory()))
@@ -219,6 +230,13 @@ def run(scenario: Scenario, settings: RunSettings, out: Path, advance: Callable[
         folder.write("versions.json", json.dumps(versions(), indent=2) + "\n")
         folder.write("report.json", report.to_json())
     return report
+
+
+def _map_maker(simulator: Simulator, settings: RunSettings) -> "MapMaker":
+    from scenarios.mapping import MapMaker  # loads what is needed by those who want a map alone
+    from scenarios.static_world import StaticWorld
+
+    return MapMaker(settings.methods, StaticWorld(simulator.scene, simulator.camera), MappingSettings())
 
 
 def closed_loop(front_end: FrontEnd, settings: RunSettings, first: RgbdFrame, T_world_camera: FloatArray) -> ClosedLoop:

@@ -4,7 +4,8 @@ import numpy as np
 import trimesh
 
 from dotmask.evaluation.mapping import SurfaceSamples
-from dotmask.records import FloatArray
+from dotmask.geometry import transform
+from dotmask.records import DepthImage, FloatArray
 from scenarios.bridge import intrinsics_from_camera
 from sim.records import CameraModel, Moment
 from sim.renderers.visibility_buffer import VisibilityBufferRenderer
@@ -27,19 +28,19 @@ class StaticWorld:
         self._renderer = VisibilityBufferRenderer(self._scene, camera, shadow_size=0)
         self.intrinsics = intrinsics_from_camera(camera)
 
-    def depth_m(self, T_world_camera: FloatArray) -> np.ndarray:
+    def depth_m(self, T_world_camera: FloatArray) -> DepthImage:
         """(H, W) float32 true depth from a pose (4, 4), metres, 0 = nothing hit."""
         return self._renderer.render(Moment(T_world_camera=T_world_camera, palettes={})).depth_m
 
     def samples(self) -> SurfaceSamples:
         """Points on all its surfaces, one for each square of SPACING_M in the mean; the same ones every time."""
-        meshes = []
-        for thing in self._scene.objects:
-            T_world_object = thing.motion.palette_at(0.0)[0]
-            for surface in thing.surfaces:
-                mesh = trimesh.Trimesh(surface.vertices, surface.faces, process=False)
-                meshes.append(mesh.apply_transform(T_world_object))
-        whole = trimesh.util.concatenate(meshes)
+        corners = [
+            transform(thing.motion.palette_at(0.0)[0], surface.vertices.astype(np.float64))[surface.faces]
+            for thing in self._scene.objects
+            for surface in thing.surfaces
+        ]
+        vertices = np.concatenate(corners).reshape(-1, 3)
+        whole = trimesh.Trimesh(vertices, np.arange(len(vertices)).reshape(-1, 3), process=False)
         count = max(int(whole.area / SPACING_M**2), 1)
         points, faces = trimesh.sample.sample_surface(whole, count, seed=0)
         return SurfaceSamples(

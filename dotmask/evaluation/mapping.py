@@ -23,7 +23,7 @@ IN_FRONT_M = 0.1
 IN_FRONT_PER_M2 = 0.01
 """... times the square of its depth, metres: three standard deviations of the noise, and a step of the disparity."""
 
-AROUND_PX = 2
+AROUND_PX = 4
 """The depth of a pixel may be that of a pixel of the static world so far beside it."""
 
 SEEN_MARGIN_M = 0.02
@@ -71,7 +71,7 @@ def shows_ghost(depth_m: DepthImage, is_actor: npt.NDArray[np.bool_], static_dep
     """Which pixels (H, W) measured something that can move.
 
     A pixel did if an actor is there in truth, or if it measured something well in front of all that the static world
-    has within two pixels: with depth and colour of different moments, an actor's depth lies beside the actor.
+    has within a few pixels: with depth and colour of different moments, an actor's depth lies beside the actor.
 
     Args:
         depth_m: (H, W) as the sensor gave it, metres, 0 = none.
@@ -102,11 +102,11 @@ def seen_samples(
         range_m: nearest and farthest depth that the map uses.
     """
     seen = np.zeros(len(samples.points_m), np.bool_)
-    points_camera = transform(inverse(T_world_camera), samples.points_m)
-    facing = ((samples.points_m - T_world_camera[:3, 3]) * samples.normals).sum(axis=1) < 0
-    z = points_camera[:, 2]
-    asked = np.flatnonzero(facing & (z >= range_m[0]) & (z <= range_m[1]))
-    u, v = np.rint(project(points_camera[asked], intrinsics)).T
+    ray = samples.points_m - T_world_camera[:3, 3]
+    z = ray[:, 0] * T_world_camera[0, 2] + ray[:, 1] * T_world_camera[1, 2] + ray[:, 2] * T_world_camera[2, 2]
+    asked = np.flatnonzero((z >= range_m[0]) & (z <= range_m[1]))
+    asked = asked[(ray[asked] * samples.normals[asked]).sum(axis=1) < 0]
+    u, v = np.rint(project(transform(inverse(T_world_camera), samples.points_m[asked]), intrinsics)).T
     inside = (u >= 0) & (v >= 0) & (u < intrinsics.width) & (v < intrinsics.height)
     asked, u, v = asked[inside], u[inside].astype(np.intp), v[inside].astype(np.intp)
     depth = static_depth_m[v, u].astype(np.float64)
@@ -147,8 +147,8 @@ def map_errors(
 def surface_distances(points_m: FloatArray, samples: SurfaceSamples) -> FloatArray:
     """(N,) distance of points (N, 3) to the surface, metres.
 
-    The surface around a sample is a disc in its tangent plane, as wide as the spacing of the samples: so the distance to
-    a plane is exact, and at an edge it is off by no more than the spacing.
+    The surface around a sample is a disc in its tangent plane, as wide as the spacing of the samples: so the
+    distance to a plane is exact, and at an edge it is off by no more than the spacing.
     """
     if not len(points_m):
         return np.empty(0)

@@ -97,7 +97,7 @@ def _measured(
     posed: PosedView, settings: MappingSettings
 ) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], FloatArray]:
     """Rows, columns and world points (N, 3) of the pixels of a view that the cloud uses."""
-    step = settings.pixel_step
+    step = settings.at_width(settings.pixel_step, posed.view.intrinsics.width)
     depth_m = trusted_depth(posed.view.depth_m, settings)[::step, ::step]
     v, u = np.nonzero(depth_m)
     pixels = np.stack([step * u, step * v], axis=1).astype(np.float64)

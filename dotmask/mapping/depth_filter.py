@@ -19,7 +19,8 @@ def trusted_depth(depth_m: DepthImage, settings: MappingSettings) -> DepthImage:
     nearest = cv2.erode(np.where(has_depth, depth_m, np.float32(np.inf)), np.ones((3, 3), np.uint8))
     farthest = cv2.dilate(depth_m, np.ones((3, 3), np.uint8))
     is_edge = has_depth & (farthest - nearest > np.float32(settings.edge_jump) * depth_m)
-    lost = _grown(is_edge, settings.edge_px) | _grown(~has_depth, settings.hole_px)
+    edge_px, hole_px = (settings.at_width(px, depth_m.shape[1]) for px in (settings.edge_px, settings.hole_px))
+    lost = _grown(is_edge, edge_px) | _grown(~has_depth, hole_px)
     in_range = (depth_m >= np.float32(settings.nearest_m)) & (depth_m <= np.float32(settings.farthest_m))
     return np.where(in_range & ~lost, depth_m, np.float32(0))
 

@@ -28,10 +28,11 @@ def fuse(depth_m, rgb, R, t, lens, origins, side, voxel_m, truncation_m, distanc
         lens: fx, fy, cx, cy, float32.
         origins: (B, 3) float32 world position of the centre of each block's first voxel.
         side: voxels of a block along an axis.
-        voxel_m, truncation_m: float32.
+        voxel_m: side of a voxel, float32.
+        truncation_m: float32.
         distance: (B, side^3) float32, changed; mean signed distance over the truncation, -1..1.
         weight: (B, side^3) float32, changed; sum of the weights.
-        colour: (B, side^3, 4) float32, changed; mean colour of the measurements within the truncation, and their weight.
+        colour: (B, side^3, 4) float32, changed; mean colour within the truncation, and its weight.
     """
     height, width = depth_m.shape
     fx, fy, cx, cy = lens

@@ -2,10 +2,13 @@
 
 from dataclasses import dataclass
 
+REFERENCE_WIDTH_PX = 640
+"""Image width that the settings in pixels are meant for; they scale with the width of the image, down to 1."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MappingSettings:
-    """What the map is built from, and how finely.
+    """What the map is built from, and how finely. Lengths in pixels hold at a width of 640.
 
     Attributes:
         step_m: a frame becomes a view when the camera has moved so far since the view before ...
@@ -30,10 +33,10 @@ class MappingSettings:
     step_s: float = 0.5
     most_views: int = 150
     nearest_m: float = 0.4
-    farthest_m: float = 5.0
+    farthest_m: float = 4.5
     edge_jump: float = 0.04
-    edge_px: int = 2
-    hole_px: int = 3
+    edge_px: int = 1
+    hole_px: int = 2
     voxel_m: float = 0.02
     pixel_step: int = 2
     least_views: int = 2
@@ -52,3 +55,8 @@ class MappingSettings:
             raise ValueError(f"mapping settings: the range {self.nearest_m} to {self.farthest_m} m is empty")
         if self.truncation_m < 2 * self.voxel_m:
             raise ValueError("mapping settings: truncation_m must be at least two voxels")
+
+    @staticmethod
+    def at_width(length_px: int, width_px: int) -> int:
+        """A length in pixels of these settings, in an image of another width."""
+        return max(1, round(length_px * width_px / REFERENCE_WIDTH_PX)) if length_px else 0

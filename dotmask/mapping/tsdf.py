@@ -7,6 +7,7 @@ out first, and each view then also says of the blocks of the others what is empt
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -133,11 +134,9 @@ def extract_mesh(field: DistanceField) -> Mesh:
         colours.append(_colours_at(places, colour))
         count += len(places)
     if not vertices:
-        return Mesh(
-            vertices_m=np.empty((0, 3)), faces=np.empty((0, 3), np.int32), colours=np.empty((0, 3), np.uint8)
-        )
+        return Mesh(vertices_m=np.empty((0, 3)), faces=np.empty((0, 3), np.int32), colours=np.empty((0, 3), np.uint8))
     places = np.concatenate(vertices)
-    # Cells of the merging grid are centred on multiples of 1, where most seams lie, so that seams do not straddle cells.
+    # The cells of the merging grid are centred on whole voxels, where the seams of the chunks lie.
     _, first, welded = np.unique(
         np.rint(places / SAME_VERTEX).astype(np.int64), axis=0, return_index=True, return_inverse=True
     )
@@ -154,7 +153,7 @@ def extract_mesh(field: DistanceField) -> Mesh:
 
 def _blocks_of(posed: PosedView, settings: MappingSettings) -> npt.NDArray[np.int64]:
     """(N, 3) the blocks within the truncation of what a view measured, along its rays."""
-    step = LAYOUT_STEP_PX
+    step = settings.at_width(LAYOUT_STEP_PX, posed.view.intrinsics.width)
     depth_m = trusted_depth(posed.view.depth_m, settings)[::step, ::step]
     v, u = np.nonzero(depth_m)
     pixels, depth = np.stack([step * u, step * v], axis=1).astype(np.float64), depth_m[v, u].astype(np.float64)
@@ -181,15 +180,18 @@ def _chunks(field: DistanceField) -> Iterator[tuple[FloatArray, Float32Array, Fl
             row = rows.get((int(first[0]) + offset[0], int(first[1]) + offset[1], int(first[2]) + offset[2]))
             if row is None:
                 continue
-            cut = tuple(slice(SIDE * o, min(SIDE * o + SIDE, size)) for o in offset)
-            part = (row, *(slice(0, c.stop - c.start) for c in cut))
-            distance[cut], weight[cut], colour[cut] = field.distance[part], field.weight[part], field.colour[part]
+            x, y, z = (slice(SIDE * o, min(SIDE * o + SIDE, size)) for o in offset)
+            for dense, sparse in ((distance, field.distance), (weight, field.weight), (colour, field.colour)):
+                target = dense[x, y, z]
+                target[...] = sparse[row][: len(target), : target.shape[1], : target.shape[2]]
         yield (first * SIDE).astype(np.float64), distance, weight, colour
 
 
 def _surface(distance: Float32Array, is_seen: npt.NDArray[np.bool_]) -> tuple[FloatArray, npt.NDArray[np.int64]] | None:
     """Vertices (N, 3) in voxels and faces (M, 3) of the zero level of a dense cube, None where there is none."""
-    from skimage.measure import marching_cubes
+    from skimage import measure
+
+    march: Any = measure.marching_cubes
 
     whole = is_seen[1:] & is_seen[:-1]
     whole = whole[:, 1:] & whole[:, :-1]
@@ -199,9 +201,10 @@ def _surface(distance: Float32Array, is_seen: npt.NDArray[np.bool_]) -> tuple[Fl
     mask = np.zeros(distance.shape, np.bool_)
     mask[1:, 1:, 1:] = whole
     try:
-        vertices, faces, _, _ = marching_cubes(distance, 0.0, gradient_direction="descent", mask=mask)
+        found = march(distance, 0.0, gradient_direction="descent", mask=mask)
     except RuntimeError:  # the library's way to say that no cube crosses the level
         return None
+    vertices, faces = found[:2]
     return vertices.astype(np.float64), faces.astype(np.int64)
 
 
@@ -217,7 +220,7 @@ def _colours_at(places: FloatArray, colour: Float32Array) -> npt.NDArray[np.uint
     mixed = low_weight[:, None] * low_colour[:, :3] + high_weight[:, None] * high_colour[:, :3]
     known = total > 0
     result = np.where(known[:, None], mixed / np.where(known, total, 1.0)[:, None], NO_COLOUR)
-    return np.rint(np.clip(result, 0, 255)).astype(np.uint8)
+    return np.asarray(np.rint(np.clip(result, 0, 255)), np.uint8)
 
 
 def _large_parts(

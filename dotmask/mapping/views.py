@@ -93,7 +93,7 @@ class ViewKeeper:
         dropped: told the index of each frame whose view is dropped again.
     """
 
-    def __init__(self, settings: MappingSettings, dropped: Callable[[int], None] = lambda index: None) -> None:
+    def __init__(self, settings: MappingSettings, dropped: Callable[[int], object] = lambda index: None) -> None:
         self._settings, self._dropped = settings, dropped
         self._views: list[View] = []
         self._places = np.empty((0, 8))  # per view: position, quaternion, time, in the order of the views
