@@ -219,11 +219,14 @@ def test_depth_at_edges_at_holes_and_out_of_range_is_not_trusted() -> None:
     assert (trusted_depth(slanted, settings) > 0).all(), "a slanted surface is no edge"
 
 
-def frame(index: int, depth_m: np.ndarray | None = None) -> RgbdFrame:
+SMALL = Intrinsics(width=40, height=30, fx=35.0, fy=35.0, cx=19.5, cy=14.5)
+
+
+def frame(index: int) -> RgbdFrame:
     noise = np.random.default_rng(index)
-    depth = noise.uniform(0.5, 5, (120, 160)).astype(np.float32) if depth_m is None else depth_m
-    rgb = noise.integers(0, 256, (120, 160, 3), np.uint8)
-    return RgbdFrame(index=index, timestamp_s=index / 30, rgb=rgb, depth_m=depth, intrinsics=CAMERA)
+    depth = noise.uniform(0.5, 5, (30, 40)).astype(np.float32)
+    rgb = noise.integers(0, 256, (30, 40, 3), np.uint8)
+    return RgbdFrame(index=index, timestamp_s=index / 30, rgb=rgb, depth_m=depth, intrinsics=SMALL)
 
 
 def shifted(x_m: float) -> np.ndarray:
