@@ -1,10 +1,11 @@
 """The picture of the maps of a run: the same view of each, side by side, as in the paper's figure of maps.
 
 A map is drawn from outside of the room, looking down into it. Its surfaces are seen from their fronts alone, so the
-ceiling and the walls nearest to the viewer do not hide what is inside.
+walls nearest to the viewer do not hide what is inside, and what is as high as the ceiling is left out.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -26,6 +27,9 @@ ASIDE_RAD = np.deg2rad(20.0)
 SHOWN = 0.985
 """Share of the vertices that the picture is wide enough for: a few far ones must not make the rest small."""
 
+CEILING_M = 0.2
+"""So much below the top of a map its ceiling begins: noise turns some of it up."""
+
 BACKGROUND = (250, 250, 250)
 AMBIENT, OVERSAMPLING = 1.0, 2
 
@@ -44,8 +48,9 @@ def draw_maps(maps: Mapping[str, Mesh], T_world_cameras: Sequence[FloatArray]) -
     """
     last = list(maps.values())[-1]
     camera = Intrinsics(width=WIDTH, height=HEIGHT, fx=FOCAL_PX, fy=FOCAL_PX, cx=(WIDTH - 1) / 2, cy=(HEIGHT - 1) / 2)
+    top_m = float(np.percentile(last.vertices_m[:, 2], 99)) - CEILING_M if len(last.vertices_m) else np.inf
     T_world_viewer = viewpoint(last.vertices_m, T_world_cameras, camera)
-    return np.hstack([_panel(title, _drawn(mesh, T_world_viewer)) for title, mesh in maps.items()])
+    return np.hstack([_panel(title, _drawn(mesh, top_m, T_world_viewer)) for title, mesh in maps.items()])
 
 
 def viewpoint(points_m: FloatArray, T_world_cameras: Sequence[FloatArray], camera: Intrinsics) -> FloatArray:
@@ -67,10 +72,11 @@ def viewpoint(points_m: FloatArray, T_world_cameras: Sequence[FloatArray], camer
     return T
 
 
-def _drawn(mesh: Mesh, T_world_viewer: FloatArray) -> Picture:
-    """The mesh on a plain background, each triangle in one colour."""
+def _drawn(mesh: Mesh, top_m: float, T_world_viewer: FloatArray) -> Picture:
+    """The mesh up to a height on a plain background, each triangle in one colour."""
     scale = OVERSAMPLING
-    if not len(mesh.faces):
+    faces = mesh.faces[(mesh.vertices_m[:, 2] < top_m)[mesh.faces].all(axis=1)]
+    if not len(faces):
         return np.full((HEIGHT, WIDTH, 3), BACKGROUND, np.uint8)
     camera = CameraModel(
         width=scale * WIDTH,
@@ -81,7 +87,11 @@ def _drawn(mesh: Mesh, T_world_viewer: FloatArray) -> Picture:
         cy=(scale * HEIGHT - 1) / 2,
     )
     thing = SceneObject(
-        name="map", class_name="map", instance_id=1, surfaces=(_surface(mesh),), motion=Placed(np.eye(4))
+        name="map",
+        class_name="map",
+        instance_id=1,
+        surfaces=(_surface(replace(mesh, faces=faces)),),
+        motion=Placed(np.eye(4)),
     )
     renderer = VisibilityBufferRenderer(Scene(objects=(thing,), lights=(), ambient=AMBIENT), camera, shadow_size=0)
     images = renderer.render(Moment(T_world_camera=T_world_viewer, palettes={}))

@@ -76,7 +76,8 @@ class MapMaker:
             write_ply(folder.path / f"mesh_{name}.ply", mesh.vertices_m, mesh.colours, mesh.faces)
             errors = map_errors(cloud.points_m, self._is_ghost(name, cloud, views), self._samples, self._is_observable)
             reports[name] = MapReport(views=len(views), **asdict(errors))
-        write_picture(folder.path / "map.png", draw_maps(meshes, [posed.T_world_camera for posed in views]))
+        titles = {f"{name}: {_ghosts(reports[name])}": mesh for name, mesh in meshes.items()}
+        write_picture(folder.path / "map.png", draw_maps(titles, [posed.T_world_camera for posed in views]))
         return reports
 
     def _is_ghost(self, name: str, cloud: PointCloud, views: Sequence[PosedView]) -> npt.NDArray[np.bool_]:
@@ -87,3 +88,8 @@ class MapMaker:
             shows = np.unpackbits(self._ghosts[name][posed.view.index], count=point.size).reshape(point.shape)
             ghosts += np.bincount(point[(point >= 0) & (shows > 0)], minlength=len(cloud))
         return np.asarray(2 * ghosts >= cloud.pixels)
+
+
+def _ghosts(report: MapReport) -> str:
+    share = report.ghost_fraction
+    return "no points" if share is None else f"{100 * share:.1f} % of the points are ghosts"

@@ -96,13 +96,14 @@ def square(z_m: float, colour: tuple[int, int, int]) -> Mesh:
 
 
 def test_a_map_is_drawn_in_its_colours_and_from_its_front_alone() -> None:
+    """And without its ceiling, even if a part of that is turned up."""
     ahead = np.eye(4)
     ahead[:3, :3] = [[0, 0, 1], [-1, 0, 0], [0, -1, 0]]
     floor = square(0.0, (200, 40, 40))
     ceiling = square(2.0, (40, 200, 40))
     room = Mesh(
         vertices_m=np.concatenate([floor.vertices_m, ceiling.vertices_m]),
-        faces=np.concatenate([floor.faces, ceiling.faces[:, ::-1] + 4]),
+        faces=np.concatenate([floor.faces, ceiling.faces[:1] + 4, ceiling.faces[1:, ::-1] + 4]),
         colours=np.concatenate([floor.colours, ceiling.colours]),
     )
     picture = draw_maps({"room": room}, [ahead]).astype(int)
