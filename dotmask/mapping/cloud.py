@@ -1,4 +1,4 @@
-"""The coloured point cloud: one point for each voxel that was measured in enough views."""
+"""The coloured point cloud: one point for each voxel that was measured, where enough views agree."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ class PointCloud:
         points_m: (N, 3) float64, mean of the measurements in a voxel, metres.
         colours: (N, 3) uint8, mean of their colours.
         pixels: (N,) number of measurements.
-        views: (N,) number of views that they are from.
+        views: (N,) number of views that measured something around it, see `settings.support_voxels`.
         keys: (N,) increasing, which voxel each point is of.
         settings: that the cloud was made with.
     """
@@ -60,7 +60,7 @@ class PointCloud:
 
 @dataclass(slots=True, eq=False)
 class _Sums:
-    """What was added up in each voxel: position (3), colour (3), pixels, views."""
+    """What was added up in each voxel: position (3), colour (3), pixels. Or in each larger cube: views."""
 
     keys: Keys
     sums: FloatArray
@@ -73,21 +73,21 @@ def build_cloud(views: Sequence[PosedView], settings: MappingSettings) -> PointC
         views: with their poses.
         settings: size of the voxels, and which depth is used.
     """
-    total = _Sums(np.empty(0, np.int64), np.empty((0, 8)))
-    waiting: list[_Sums] = []
-    for posed in views:
-        waiting.append(_voxels(posed, settings))
-        if len(waiting) == MERGED_AT_ONCE:
-            total, waiting = _merged([total, *waiting]), []
-    total = _merged([total, *waiting])
-    enough = total.sums[:, 7] >= settings.least_views
-    keys, sums = total.keys[enough], total.sums[enough]
+    voxels, cubes = _Sums(np.empty(0, np.int64), np.empty((0, 7))), _Sums(np.empty(0, np.int64), np.empty((0, 1)))
+    for first in range(0, len(views), MERGED_AT_ONCE):
+        seen = [_voxels(posed, settings) for posed in views[first : first + MERGED_AT_ONCE]]
+        voxels = _merged([voxels, *seen])
+        cubes = _merged([cubes, *(_cubes(part.keys, settings.support_voxels) for part in seen)])
+    at = np.searchsorted(cubes.keys, _cube_keys(voxels.keys, settings.support_voxels))
+    seen_in = cubes.sums[at, 0]
+    enough = seen_in >= settings.least_views
+    keys, sums = voxels.keys[enough], voxels.sums[enough]
     pixels = sums[:, 6]
     return PointCloud(
         points_m=sums[:, :3] / pixels[:, None],
         colours=np.rint(sums[:, 3:6] / pixels[:, None]).astype(np.uint8),
         pixels=pixels.astype(np.int64),
-        views=sums[:, 7].astype(np.int64),
+        views=seen_in[enough].astype(np.int64),
         keys=keys,
         settings=settings,
     )
@@ -113,13 +113,24 @@ def _keys(points_m: FloatArray, voxel_m: float) -> Keys:
     return np.asarray((cells[:, 0] << (2 * _BITS)) | (cells[:, 1] << _BITS) | cells[:, 2])
 
 
+def _cube_keys(keys: Keys, voxels: int) -> Keys:
+    """(N,) the cube of `voxels` along an axis that each voxel lies in."""
+    ones = (1 << _BITS) - 1
+    x, y, z = (keys >> (2 * _BITS)) // voxels, ((keys >> _BITS) & ones) // voxels, (keys & ones) // voxels
+    return np.asarray((x << (2 * _BITS)) | (y << _BITS) | z)
+
+
 def _voxels(posed: PosedView, settings: MappingSettings) -> _Sums:
     v, u, points = _measured(posed, settings)
     colours = posed.view.rgb[v, u].astype(np.float64)
-    ones = np.ones((len(points), 1))
-    added = _added(_keys(points, settings.voxel_m), np.concatenate([points, colours, ones, ones], axis=1))
-    added.sums[:, 7] = 1.0
-    return added
+    rows = np.concatenate([points, colours, np.ones((len(points), 1))], axis=1)
+    return _added(_keys(points, settings.voxel_m), rows)
+
+
+def _cubes(keys: Keys, voxels: int) -> _Sums:
+    """The cubes of the voxels of one view, each counted once."""
+    cubes = np.unique(_cube_keys(keys, voxels))
+    return _Sums(cubes, np.ones((len(cubes), 1)))
 
 
 def _merged(parts: list[_Sums]) -> _Sums:

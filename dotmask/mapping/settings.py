@@ -22,15 +22,17 @@ class MappingSettings:
             of a mask is of another moment than the depth.
         voxel_m: side of the voxels of the cloud and of the mesh.
         pixel_step: the cloud takes every so many-th pixel in u and v.
-        least_views: a point of the cloud was measured in so many views at least.
+        least_views: a point of the cloud is kept if so many views measured something around it ...
+        support_voxels: ... in the same cube of so many voxels along an axis. Far away the noise is wider than a voxel,
+            so two views of one place rarely meet in the same voxel.
         truncation_m: signed distances beyond it are cut off; surfaces closer together than twice that disturb each
             other.
         least_part_faces: connected parts of the mesh with fewer faces are left out.
     """
 
-    step_m: float = 0.15
-    step_rad: float = 0.15
-    step_s: float = 0.5
+    step_m: float = 0.1
+    step_rad: float = 0.1
+    step_s: float = 0.3
     most_views: int = 150
     nearest_m: float = 0.4
     farthest_m: float = 4.5
@@ -40,6 +42,7 @@ class MappingSettings:
     voxel_m: float = 0.02
     pixel_step: int = 2
     least_views: int = 2
+    support_voxels: int = 3
     truncation_m: float = 0.08
     least_part_faces: int = 200
 
@@ -48,7 +51,14 @@ class MappingSettings:
         for name in ("step_m", "step_rad", "step_s", "nearest_m", "edge_jump", "voxel_m"):
             if not getattr(self, name) > 0:
                 raise ValueError(f"mapping settings: {name} must be positive")
-        for name, least in (("most_views", 2), ("pixel_step", 1), ("least_views", 1), ("edge_px", 0), ("hole_px", 0)):
+        for name, least in (
+            ("most_views", 2),
+            ("pixel_step", 1),
+            ("least_views", 1),
+            ("support_voxels", 1),
+            ("edge_px", 0),
+            ("hole_px", 0),
+        ):
             if getattr(self, name) < least:
                 raise ValueError(f"mapping settings: {name} must be at least {least}")
         if not self.nearest_m < self.farthest_m:

@@ -172,10 +172,21 @@ def test_the_cloud_of_a_cube_lies_on_it_and_mixes_colours() -> None:
 
 
 def test_a_point_needs_enough_views() -> None:
-    cloud = build_cloud(CUBE_VIEWS, replace(SETTINGS, least_views=2))
+    cloud = build_cloud(CUBE_VIEWS, replace(SETTINGS, least_views=2, support_voxels=1))
     assert len(cloud) > 300
     assert cloud.views.min() == 2
     assert cloud.points_m[:, 2].min() > -CUBE_M / 2 + 0.01, "the bottom was seen once"
+
+
+def test_views_agree_if_they_measure_in_the_same_cube_of_voxels() -> None:
+    T = looking((0.0, 0.0, 1.0), (0.01, 0.0, 0.0))
+    views = [posed(T, plane_depth(T, (0, 0, 1), z), index=i) for i, z in enumerate((0.001, 0.021, 0.401))]
+    strict = build_cloud(views, replace(SETTINGS, pixel_step=1, support_voxels=1))
+    assert len(strict) == 0, "no two of the planes share a voxel"
+    heights = build_cloud(views, replace(SETTINGS, pixel_step=1, support_voxels=50)).points_m[:, 2]
+    assert {0.001, 0.021} <= set(heights.round(6)) <= {0.001, 0.021, 0.401}
+    near = build_cloud(views, replace(SETTINGS, pixel_step=1, support_voxels=3)).points_m[:, 2]
+    assert near.max() < 0.03, "nothing confirms the third plane"
 
 
 def test_pixels_know_their_points() -> None:
