@@ -1,5 +1,7 @@
 """What a map should look like: the surface of all that cannot move, and how it looks from anywhere."""
 
+from dataclasses import replace
+
 import numpy as np
 import trimesh
 
@@ -9,9 +11,11 @@ from dotmask.records import DepthImage, FloatArray
 from scenarios.bridge import intrinsics_from_camera
 from sim.records import CameraModel, Moment
 from sim.renderers.visibility_buffer import VisibilityBufferRenderer
-from sim.scene import Scene
+from sim.scene import Scene, SceneObject
 
 SPACING_M = 0.02
+
+NO_TEXTURE = np.zeros((1, 1, 3), np.uint8)
 
 
 class StaticWorld:
@@ -23,8 +27,8 @@ class StaticWorld:
     """
 
     def __init__(self, scene: Scene, camera: CameraModel) -> None:
-        self._scene = Scene(objects=tuple(o for o in scene.objects if not o.is_actor), lights=())
-        # Depth alone is asked for, so it needs neither light nor the run's own renderer.
+        # Depth alone is asked for: without lights, without the memory of textures, and not by the run's own renderer.
+        self._scene = Scene(objects=tuple(_plain(o) for o in scene.objects if not o.is_actor), lights=())
         self._renderer = VisibilityBufferRenderer(self._scene, camera, shadow_size=0)
         self.intrinsics = intrinsics_from_camera(camera)
 
@@ -48,3 +52,7 @@ class StaticWorld:
             normals=np.asarray(whole.face_normals[faces], np.float64),
             spacing_m=SPACING_M,
         )
+
+
+def _plain(thing: SceneObject) -> SceneObject:
+    return replace(thing, surfaces=tuple(replace(surface, texture=NO_TEXTURE) for surface in thing.surfaces))

@@ -60,6 +60,17 @@ def test_the_line_of_the_maps_names_every_method_and_is_absent_without_maps(mapp
     assert maps(mapped[0].model_copy(update={"methods": plain})) is None
 
 
+def test_a_map_is_made_when_it_is_asked_for_alone(tmp_path: Path, dotmask) -> None:
+    arguments = ("run", "smoke", "--frames", 2, "--methods", "dotmask")
+    plain = dotmask(*arguments, "--out", tmp_path / "plain")
+    mapped = dotmask(*arguments, "--out", tmp_path / "mapped", "--map", "--expect", "map.ghost_fraction<=0")
+    assert (plain.code, mapped.code) == (0, 1), "with two frames nothing is seen in two views"
+    made = {path.name for path in (tmp_path / "mapped").iterdir()} - {p.name for p in (tmp_path / "plain").iterdir()}
+    assert made == {"map.png", "map_dotmask.ply", "mesh_dotmask.ply"}
+    assert "map of dotmask" in mapped.out
+    assert "map of" not in plain.out
+
+
 def test_the_picture_shows_both_maps(mapped: tuple[Report, Path]) -> None:
     picture = cv2.imread(str(mapped[1] / "map.png"))
     assert picture.shape == (HEIGHT, 2 * WIDTH, 3)

@@ -81,7 +81,9 @@ def test_report_json_follows_the_contract() -> None:
         "missed_starts", "start_latency_frames", "start_latency_max_frames", "by_class",
     ]  # fmt: skip
     assert list(dotmask["masks"]) == ["iou", "boundary_f", "leak", "waste"]
-    assert list(dotmask["map"]) == ["ghost_fraction", "accuracy_m", "completeness"]
+    assert list(dotmask["map"]) == [
+        "ghost_fraction", "accuracy_m", "accuracy_median_m", "completeness", "points", "views",
+    ]  # fmt: skip
     assert list(dotmask["loops"]) == ["count", "trans_error_m", "rot_error_rad"]
     assert list(dotmask["time_ms"]) == ["segment", "track", "classify", "mask", "odometry", "map"]
 
