@@ -8,7 +8,6 @@ import trimesh
 from dotmask.evaluation.mapping import SurfaceSamples
 from dotmask.geometry import transform
 from dotmask.records import DepthImage, FloatArray
-from scenarios.bridge import intrinsics_from_camera
 from sim.records import CameraModel, Moment
 from sim.renderers.visibility_buffer import VisibilityBufferRenderer
 from sim.scene import Scene, SceneObject
@@ -30,7 +29,6 @@ class StaticWorld:
         # Depth alone is asked for: without lights, without the memory of textures, and not by the run's own renderer.
         self._scene = Scene(objects=tuple(_plain(o) for o in scene.objects if not o.is_actor), lights=())
         self._renderer = VisibilityBufferRenderer(self._scene, camera, shadow_size=0)
-        self.intrinsics = intrinsics_from_camera(camera)
 
     def depth_m(self, T_world_camera: FloatArray) -> DepthImage:
         """(H, W) float32 true depth from a pose (4, 4), metres, 0 = nothing hit."""
