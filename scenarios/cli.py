@@ -246,6 +246,9 @@ def run(
     intrinsics: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Camera of a folder: JSON with width, height, fx, fy, cx, cy.")
     ] = None,
+    with_map: Annotated[
+        bool, typer.Option("--map", help="Build, judge and draw the maps: map_METHOD.ply, mesh_METHOD.ply, map.png.")
+    ] = False,
 ) -> None:
     """Render once, run every method on the same bytes, and compare each stage with the truth.
 
@@ -253,11 +256,13 @@ def run(
 
     dotmask run fr3_walking_xyz --frames 300 --set camera.speed=2 --out runs/fast --expect 'ate_rmse_m<0.03'
 
+    dotmask run fr3_walking_xyz --methods unmasked,dotmask --map --out runs/mapped
+
     dotmask run --from runs/fast/scenario.json --out runs/again
 
     dotmask run data/rgbd_dataset_freiburg3_walking_xyz
     """
-    from scenarios.report import expectation, table, times
+    from scenarios.report import expectation, maps, table, times
     from scenarios.run import RunSettings, default_out, free_folder, run_source
     from scenarios.sources import Recorded, Simulated, Source
 
@@ -271,6 +276,7 @@ def run(
         renderer=renderer,
         threads=threads,
         video=video,
+        with_map=with_map,
     )
     expectations = [expectation(text, settings.methods) for text in expect or []]
     sequence: Source
@@ -298,6 +304,9 @@ def run(
     else:
         _console().print(table(report))
         _console().print(times(report), highlight=False)
+        of_maps = maps(report)
+        if of_maps is not None:
+            _console().print(of_maps, highlight=False)
         _console().print(f"frame hash {report.frame_hash[:16]}, results in {folder}", highlight=False)
     missed = False
     for wanted in expectations:

@@ -21,6 +21,7 @@ from scenarios.report import (
     ConfusionReport,
     EkfReport,
     LoopReport,
+    MapReport,
     MaskReport,
     MethodReport,
     MocReport,
@@ -169,8 +170,13 @@ class Judge:
         """The poses that SLAM gave; frames in which it was lost are missing."""
         return _trajectory(self._estimate)
 
-    def report(self, slam: SlamResult | None = None) -> MethodReport:
-        """All figures; those of the optimised map only with `slam`, what SLAM knew after the last frame."""
+    def report(self, slam: SlamResult | None = None, of_map: MapReport | None = None) -> MethodReport:
+        """All figures.
+
+        Args:
+            slam: what SLAM knew after the last frame; without it the figures of the optimised poses are null.
+            of_map: the figures of the map, where one was built.
+        """
         truth, estimate = self.truth_trajectory(), self.estimated_trajectory()
         ate = absolute_trajectory_error(truth, estimate)
         rpe = relative_pose_error(truth, estimate)
@@ -192,6 +198,7 @@ class Judge:
                 leak=self._masks.leak,
                 waste=self._masks.waste,
             ),
+            map=MapReport() if of_map is None else of_map,
             time_ms=StageTimes(**{stage: 1e3 * float(np.mean(s)) for stage, s in self._seconds.items()}),
         )
 

@@ -160,11 +160,26 @@ class MaskReport(Part):
 
 
 class MapReport(Part):
-    """The map: ghosts of moving objects, accuracy and completeness against the scene."""
+    """The point cloud against the scene without all that can move; null unless a map was asked for.
+
+    A point is a ghost when at least half of the pixels it was measured in showed something that can move, whether it
+    moved or not. The observable surface is what the camera would have seen in range without anything that can move.
+
+    Attributes:
+        ghost_fraction: share of the points that are ghosts.
+        accuracy_m: mean distance of the other points to the static surface.
+        accuracy_median_m: median of the same.
+        completeness: share of the observable static surface with a point that is no ghost within 5 cm.
+        points: of the cloud.
+        views: frames that it was built from.
+    """
 
     ghost_fraction: Measured = None
     accuracy_m: Measured = None
+    accuracy_median_m: Measured = None
     completeness: Measured = None
+    points: int | None = None
+    views: int | None = None
 
 
 class StageTimes(Part):
@@ -301,6 +316,21 @@ def times(report: Report) -> str:
         parts.append(f"{name}: {', '.join([*stages, f'odometry {_number(method.time_ms.odometry)}'])}")
     world = "" if report.time_ms.render is None else f"render {_number(report.time_ms.render)} (wall); "
     return f"ms per frame: {world}CPU of " + "; ".join(parts)
+
+
+def maps(report: Report) -> str | None:
+    """One line: ghosts, accuracy and completeness of each method's map; None when no map was asked for."""
+    parts = []
+    for name, method in report.methods.items():
+        if method.map.ghost_fraction is not None:
+            parts.append(
+                f"{name}: ghosts {_number(method.map.ghost_fraction, 100, 2)} %, "
+                f"off by {_number(method.map.accuracy_m, 1e3)} mm, "
+                f"complete to {_number(method.map.completeness, 100)} %"
+            )
+        elif method.map.points is not None:
+            parts.append(f"{name}: {method.map.points} points from {method.map.views} views")
+    return "map of " + "; ".join(parts) if parts else None
 
 
 COMPARISONS: dict[str, Callable[[float, float], bool]] = {

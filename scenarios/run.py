@@ -7,12 +7,13 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import cast, get_args
+from typing import TYPE_CHECKING, cast, get_args
 
 import cv2
 import numpy as np
 
 from dotmask.interfaces import Segmenter
+from dotmask.mapping.settings import MappingSettings
 from dotmask.original import OriginalDotMask
 from dotmask.pipeline import ClosedLoop, DotMask, FrontEnd, MaskAll, Unmasked
 from dotmask.profiles import ORIGINAL, PoseFeedback, Profile
@@ -31,6 +32,9 @@ from scenarios.spec import Scenario
 from scenarios.video import PathsPanel, Video, write_picture
 from scenarios.world import RENDERERS
 from sim.records import GroundTruth
+
+if TYPE_CHECKING:
+    from scenarios.mapping import MapMaker
 
 
 def _method(segmenter: Segmenter, chosen: Profile) -> FrontEnd:
@@ -61,6 +65,7 @@ class RunSettings:
     renderer: str
     threads: int
     video: bool
+    with_map: bool
 
     @classmethod
     def parse(
@@ -74,6 +79,7 @@ class RunSettings:
         renderer: str = "numba",
         threads: int = 2,
         video: bool = False,
+        with_map: bool = False,
     ) -> "RunSettings":
         """Settings from the words of a command line.
 
@@ -109,6 +115,7 @@ class RunSettings:
             renderer=renderer,
             threads=threads,
             video=video,
+            with_map=with_map,
         )
 
 
@@ -151,6 +158,7 @@ def run_source(source: Source, settings: RunSettings, out: Path, advance: Callab
         judges = {name: Judge(name) for name in settings.methods}
         digest, seconds = hashlib.sha256(), 0.0
         paths = PathsPanel(640, 480, settings.methods)
+        maker = _map_maker(source, settings) if settings.with_map else None
         video: Video | None = None
         for timed in source.frames():
             frame, truth = timed.frame.frame, timed.frame.truth
@@ -175,6 +183,8 @@ def run_source(source: Source, settings: RunSettings, out: Path, advance: Callab
             results = dict(zip(loops, steps, strict=True))
             for name, result in results.items():
                 judges[name].see(truth, result, folder)
+            if maker is not None:
+                maker.see(truth, results)
             paths.add(truth.T_world_camera, results)
             if video is not None:
                 video.add(results, paths)
@@ -182,6 +192,7 @@ def run_source(source: Source, settings: RunSettings, out: Path, advance: Callab
         if video is not None:
             video.close()
         slam_results = {name: loop.finish() for name, loop in loops.items()}
+        of_maps = {} if maker is None else maker.finish(slam_results, folder)
         report = Report(
             scenario=source.name,
             seed=source.seed,
@@ -191,7 +202,7 @@ def run_source(source: Source, settings: RunSettings, out: Path, advance: Callab
             slam=settings.slam,
             profile=settings.profile,
             frame_hash=digest.hexdigest(),
-            methods={name: judge.report(slam_results[name]) for name, judge in judges.items()},
+            methods={name: judge.report(slam_results[name], of_maps.get(name)) for name, judge in judges.items()},
             time_ms=WorldTimes(render=None if source.renderer is None else 1e3 * seconds / len(source)),
         )
         folder.write("trajectory_truth.txt", format_trajectory(judges[settings.methods[0]].truth_trajectory()))
@@ -217,6 +228,12 @@ def _segmenter(source: Source, settings: RunSettings) -> Segmenter:
             f"--segmenter oracle: the true masks of {source.name} are not known, it is recorded; use --segmenter none"
         )
     return source.oracle
+
+
+def _map_maker(source: Source, settings: RunSettings) -> "MapMaker":
+    from scenarios.mapping import MapMaker  # loads what is needed by those who want a map alone
+
+    return MapMaker(settings.methods, source.static_world(), MappingSettings())
 
 
 def closed_loop(front_end: FrontEnd, settings: RunSettings, first: RgbdFrame, T_world_camera: FloatArray) -> ClosedLoop:

@@ -20,6 +20,7 @@ PACKAGES = (
     "scipy",
     "opencv-python-headless",
     "trimesh",
+    "scikit-image",
     "pybullet",
     "gtsam",
     "pydantic",

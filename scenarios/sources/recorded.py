@@ -66,6 +66,10 @@ class Recorded:
 
         return made_ahead(make, range(len(self)))
 
+    def static_world(self) -> None:
+        """Nobody knows."""
+        return None
+
     def describe(self, folder: RunFolder) -> None:
         """Write `recording.json`: folder, camera, time span, what the world is, and the notes."""
         sequence = self._sequence

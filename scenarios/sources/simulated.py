@@ -1,6 +1,8 @@
 """Frames of a scenario, rendered as they are asked for."""
 
 from collections.abc import Iterator
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 from scenarios.bridge import rgbd_frame_from_sim
 from scenarios.faults.chain import Faults
@@ -10,6 +12,10 @@ from scenarios.sources.ahead import Timed, made_ahead
 from scenarios.sources.source import SourceFrame
 from scenarios.spec import Scenario
 from scenarios.world import build_simulator
+from sim.simulator import Simulator
+
+if TYPE_CHECKING:
+    from scenarios.static_world import StaticWorld
 
 
 class Simulated:
@@ -29,9 +35,14 @@ class Simulated:
         self.frame_rate_hz: float = scenario.frame_rate_hz
         self.oracle: OracleSegmenter | None = OracleSegmenter(Faults(scenario))
 
+    @cached_property
+    def _simulator(self) -> Simulator:
+        assert self.renderer is not None
+        return build_simulator(self._scenario, self.renderer, self._threads)
+
     def __len__(self) -> int:
         """Number of frames."""
-        return self._scenario.frames
+        return len(self._simulator)
 
     def frames(self) -> Iterator[Timed[SourceFrame]]:
         """See `Source`.
@@ -39,14 +50,19 @@ class Simulated:
         Raises:
             SimError, ScenarioError: the scenario's world cannot be built.
         """
-        assert self.renderer is not None
-        simulator = build_simulator(self._scenario, self.renderer, self._threads)
+        simulator = self._simulator
 
         def make(index: int) -> SourceFrame:
             frame = simulator.frame(index)
             return SourceFrame(frame=rgbd_frame_from_sim(frame), truth=frame.truth)
 
         return made_ahead(make, range(len(self)))
+
+    def static_world(self) -> "StaticWorld":
+        """The scene without all that can move."""
+        from scenarios.static_world import StaticWorld  # loads what is needed by those who want a map alone
+
+        return StaticWorld(self._simulator.scene, self._simulator.camera)
 
     def describe(self, folder: RunFolder) -> None:
         """Write `scenario.json`, which `--from` repeats."""

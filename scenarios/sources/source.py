@@ -2,13 +2,16 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from dotmask.records import FloatArray, RgbdFrame
 from scenarios.oracle import OracleSegmenter
 from scenarios.run_folder import RunFolder
 from scenarios.sources.ahead import Timed
 from sim.records import GroundTruth
+
+if TYPE_CHECKING:
+    from scenarios.static_world import StaticWorld
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -60,6 +63,10 @@ class Source(Protocol):
 
     def frames(self) -> Iterator[Timed[SourceFrame]]:
         """The frames in the order of time, with the wall time that making each took."""
+        ...
+
+    def static_world(self) -> "StaticWorld | None":
+        """What a map should look like; None where it is not known."""
         ...
 
     def describe(self, folder: RunFolder) -> None:

@@ -19,6 +19,7 @@ HEAVY = (
     "gymnasium",
     "numpy",
     "matplotlib",
+    "skimage",
 )
 
 

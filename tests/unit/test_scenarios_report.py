@@ -82,7 +82,9 @@ def test_report_json_follows_the_contract() -> None:
         "missed_starts", "start_latency_frames", "start_latency_max_frames", "by_class",
     ]  # fmt: skip
     assert list(dotmask["masks"]) == ["iou", "boundary_f", "leak", "waste"]
-    assert list(dotmask["map"]) == ["ghost_fraction", "accuracy_m", "completeness"]
+    assert list(dotmask["map"]) == [
+        "ghost_fraction", "accuracy_m", "accuracy_median_m", "completeness", "points", "views",
+    ]  # fmt: skip
     assert list(dotmask["loops"]) == [
         "count", "false_count", "trans_error_m", "trans_error_max_m", "rot_error_rad",
     ]  # fmt: skip
