@@ -110,9 +110,7 @@ def _compile(source: bytes, path: Path) -> None:
             )
             if done.returncode != 0:
                 said = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr.strip())
-                raise SlamError(
-                    f"{compiler} cannot compile the bridge to RTAB-Map: {said}; set CXX to another compiler"
-                )
+                raise SlamError(f"{compiler} cannot compile the bridge to RTAB-Map ({said}): set CXX to another one")
             os.replace(made, path)
     except OSError as error:
         raise SlamError(
