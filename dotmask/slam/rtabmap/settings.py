@@ -21,7 +21,6 @@ closure has joined it to the old one."""
 BASE = {
     "Odom/ResetCountdown": "15",
     "RGBD/AngularUpdate": "0",
-    "RGBD/CreateOccupancyGrid": "false",
     "RGBD/LinearUpdate": "0",
     "Rtabmap/DetectionRate": "2",
 }
