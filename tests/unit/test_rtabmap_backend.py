@@ -205,6 +205,18 @@ def test_a_new_odometry_has_no_pose_until_the_map_has_one_for_it(stand) -> None:
     assert [(loop.from_index, loop.to_index, loop.kind) for loop in result.loops] == [(4, 0, LoopKind.GLOBAL)]
 
 
+def test_a_new_odometry_has_as_many_frames_to_begin_as_the_first(stand) -> None:
+    run = stand(
+        {"Odom/ResetCountdown": "2"},
+        TRACK=[rows(moved(0)), *[None] * 5],
+        MAP=[rows(moved(0))],
+        RESTART=["done", "done"],
+    )
+    for index in range(6):
+        run.step(index)
+    assert [command[0] for command, *_ in run.asked] == list("TMTTRTTRT")
+
+
 def test_an_odometry_that_was_never_joined_has_no_optimised_poses(stand) -> None:
     run = stand(
         {"Odom/ResetCountdown": "1"},

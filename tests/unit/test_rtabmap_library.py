@@ -75,6 +75,15 @@ def test_the_home_folder_has_the_cache_where_nothing_else_is_said(
     assert Path(library.find_libraries().bridge).parent == machine / "home/.cache/dotmask"
 
 
+def test_a_bridge_that_another_process_has_loaded_is_not_written_into(machine: Path) -> None:
+    """Who was second renames its own file; the pages of the first stay as they are."""
+    path = machine / "cache/dotmask/bridge.so"
+    library._compile(b"", path)
+    with path.open() as loaded:
+        library._compile(b"", path)
+        assert os.fstat(loaded.fileno()).st_ino != path.stat().st_ino
+
+
 def test_two_processes_at_once_both_get_a_whole_bridge(machine: Path) -> None:
     """Each compiler writes a first half, waits until both are at it, and writes the second half."""
     write_compiler(
