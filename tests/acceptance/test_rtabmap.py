@@ -22,18 +22,15 @@ from scenarios.report import Report
 from scenarios.spec import with_overrides
 from scenarios.world import build_simulator
 
+FRAMES = 36
 
-def why_not() -> str:
+
+@pytest.fixture(scope="module", autouse=True)
+def _installed() -> None:
     try:
         core()
     except SlamError as error:
-        return str(error)
-    return ""
-
-
-pytestmark = pytest.mark.skipif(bool(why_not()), reason=why_not())
-
-FRAMES = 36
+        pytest.skip(str(error))
 
 
 @pytest.fixture(scope="module")
