@@ -217,6 +217,18 @@ def test_a_new_odometry_has_as_many_frames_to_begin_as_the_first(stand) -> None:
     assert [command[0] for command, *_ in run.asked] == list("TMTTRTTRT")
 
 
+def test_without_a_map_to_come_back_to_odometry_does_not_start_anew(stand) -> None:
+    """The first node of a new odometry would be the first of all, and say that the camera is back at the start."""
+    run = stand(
+        {"Odom/ResetCountdown": "2", "Rtabmap/DetectionRate": "0"},
+        TRACK=[rows(moved(0)), *[None] * 5, rows(moved(0.7))],
+        MAP=[None, rows(moved(0.7))],
+    )
+    estimates = [run.step(index) for index in range(7)]
+    assert [estimate.status.value for estimate in estimates] == ["initialising", *["lost"] * 5, "relocalised"]
+    np.testing.assert_allclose(estimates[-1].T_world_camera, START @ moved(0.7), atol=1e-6)
+
+
 def test_an_odometry_that_was_never_joined_has_no_optimised_poses(stand) -> None:
     run = stand(
         {"Odom/ResetCountdown": "1"},
@@ -291,6 +303,16 @@ def test_a_process_that_hangs_is_ended(stand) -> None:
     assert "has not answered for 0.5 s during track of frame 2" in failure(run)
     with pytest.raises(ProcessLookupError):
         os.kill(pid, 0)
+
+
+def test_after_the_end_nothing_is_sent(stand) -> None:
+    """The numbers of its pipes may be somebody else's files by now."""
+    run = stand(TRACK=[rows(moved(0))], MAP=[None], FINISH=[graph({}).hex()])
+    run.step(0)
+    run.slam.finish()
+    for again in (run.slam.finish, lambda: run.step(1)):
+        with pytest.raises(SlamError, match="has ended"):
+            again()
 
 
 def test_a_process_that_was_killed_between_frames(stand) -> None:

@@ -120,7 +120,7 @@ class RtabmapSlam:
         start = checked_pose(initial_T_world_camera, "initial_T_world_camera")
         if database.exists():
             raise SlamError(f"{database} exists already; RTAB-Map would go on with that map: remove it")
-        self._camera, self._settings, self._log = intrinsics, settings, log
+        self._camera, self._settings = intrinsics, settings
         # The map's frame is that of the first odometry, which starts at the first frame that it finds.
         self._T_world_map = start
         self._T_map_odometry: FloatArray | None = np.eye(4)
@@ -129,6 +129,7 @@ class RtabmapSlam:
         self._last: RgbdFrame | None = None
         self._frame_id, self._session, self._lost, self._just_joined = 0, 0, 0, False
         self._mapped_s: float | None = None
+        self._has_node = False
 
     @property
     def cpu_elsewhere_s(self) -> float:
@@ -147,7 +148,8 @@ class RtabmapSlam:
         """
         self._check(frame, masked)
         self._last, self._frame_id = frame, self._frame_id + 1
-        if self._tracked and 0 < self._settings.restart_after <= self._lost:
+        # Without a node there is no map to come back to, and the next odometry's would pass for it.
+        if self._has_node and 0 < self._settings.restart_after <= self._lost:
             self._worker.ask(Request(command=Command.RESTART))
             self._session, self._lost, self._T_map_odometry = self._session + 1, 0, None
         self._worker.show(frame.rgb, masked.mo_mdi_m)
@@ -190,7 +192,10 @@ class RtabmapSlam:
         self._mapped_s = frame.timestamp_s
         self._worker.show(None, masked.mdi_m)
         reply = self._worker.ask(self._request(Command.MAP, frame))
-        if reply.answer is Answer.POSE and self._T_map_odometry is None:
+        if reply.answer is Answer.NO_POSE:
+            return
+        self._has_node = True
+        if self._T_map_odometry is None:
             self._T_map_odometry = _pose(POSE.unpack(reply.payload)) @ inverse(tracked.T_odometry_camera)
             self._just_joined = True
 
@@ -338,6 +343,8 @@ class _Worker:
 
     def ask(self, request: Request) -> Reply:
         """Have a command done."""
+        if not self.close.alive:
+            raise SlamError("RTAB-Map's process has ended; make another back end")
         doing = f"{request.command.name.lower()} of frame {request.frame_id}" if request.frame_id else "its work"
         try:
             send_request(self._requests_fd, request)
