@@ -235,7 +235,7 @@ class RtabmapSlam:
         placed = []
         for frame_id, frame in self._tracked.items():
             if frame.session in nodes:
-                node = min(nodes[frame.session], key=lambda n, f=frame_id: (abs(n - f), n))  # type: ignore[misc]
+                node = _nearest(nodes[frame.session], frame_id)
                 T_node_frame = inverse(self._tracked[node].T_odometry_camera) @ frame.T_odometry_camera
                 placed.append((frame.timestamp_s, self._T_world_map @ graph.nodes[node] @ T_node_frame))
             elif frame.session == 0:  # no node, no correction: the first odometry's frame is the map's
@@ -279,6 +279,11 @@ def read_graph(payload: bytes) -> Graph:
         nodes=dict(sorted(nodes.items())),
         loops=tuple(loops[pair] for pair in sorted(loops) if pair[0] in nodes and pair[1] in nodes),
     )
+
+
+def _nearest(nodes: list[int], frame_id: int) -> int:
+    """The node nearest to a frame; of two as near, the earlier one."""
+    return min(nodes, key=lambda node: (abs(node - frame_id), node))
 
 
 def _pose(values: tuple[float, ...] | list[float]) -> FloatArray:
