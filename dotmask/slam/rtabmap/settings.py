@@ -31,8 +31,7 @@ SETS: dict[str, dict[str, str]] = {
     "default": {},
     "refined": {"Vis/MaxFeatures": "2000", "Vis/PnPRefineIterations": "5"},
 }
-"""`default`: RTAB-Map as it comes. `refined`: its PnP is refined on the inliers, with twice the features: several times
-more accurate with a depth camera."""
+"""`default`: RTAB-Map as it comes. `refined`: its PnP is refined on the inliers, of twice as many features."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
