@@ -15,3 +15,7 @@ class ProfileError(DotmaskError):
 
 class SequenceFolderError(DotmaskError):
     """A folder in the TUM RGB-D format cannot be read or written."""
+
+
+class SlamError(DotmaskError):
+    """A SLAM back end is not installed, was given a wrong parameter, or has failed."""

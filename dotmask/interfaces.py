@@ -1,6 +1,6 @@
 """The two places where another program can be put in: the segmenter and the SLAM back end."""
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from dotmask.records import Detections, MaskedDepth, PoseEstimate, RgbdFrame, SlamResult
 
@@ -29,4 +29,14 @@ class SlamBackend(Protocol):
 
     def finish(self) -> SlamResult:
         """The optimised trajectory and the loops; called once, after the last frame."""
+        ...
+
+
+@runtime_checkable
+class WorksElsewhere(Protocol):
+    """A part that has work done by another process, whose CPU time is to be counted too."""
+
+    @property
+    def cpu_elsewhere_s(self) -> float:
+        """CPU time that the other process has spent on that work so far, seconds."""
         ...

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from dotmask.classification import Classify, classify
-from dotmask.interfaces import Segmenter, SlamBackend
+from dotmask.interfaces import Segmenter, SlamBackend, WorksElsewhere
 from dotmask.masking import all_cutouts, choose_cutouts, mask_depth
 from dotmask.profiles import PoseFeedback, Profile
 from dotmask.records import (
@@ -72,17 +72,21 @@ class FrontEnd(Protocol):
 
 
 class StageClock:
-    """Adds up the CPU time that this thread spends in named stages."""
+    """Adds up the CPU time that this thread, and what works for it elsewhere, spends in named stages."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
 
     @contextmanager
-    def __call__(self, stage: str) -> Iterator[None]:
-        """Time the block as `stage`."""
-        start = time.thread_time()
+    def __call__(self, stage: str, part: object = None) -> Iterator[None]:
+        """Time the block as `stage`; `part` is what does the work, where some of it may be done in another process."""
+        start = time.thread_time() + _cpu_elsewhere_s(part)
         yield
-        self.seconds[stage] = self.seconds.get(stage, 0.0) + time.thread_time() - start
+        self.seconds[stage] = self.seconds.get(stage, 0.0) + time.thread_time() + _cpu_elsewhere_s(part) - start
+
+
+def _cpu_elsewhere_s(part: object) -> float:
+    return part.cpu_elsewhere_s if isinstance(part, WorksElsewhere) else 0.0
 
 
 class Unmasked:
@@ -282,7 +286,8 @@ class FrameResult:
         T_world_camera_predicted: (4, 4) the pose that the tracker was given.
         front_end: see FrontEndResult.
         pose: what SLAM answered.
-        stage_seconds: CPU time of the calling thread by stage (segment, track, classify, mask, odometry, map).
+        stage_seconds: CPU time by stage (segment, track, classify, mask, odometry, map): of the calling thread, and of
+            what SLAM has done elsewhere.
     """
 
     frame: RgbdFrame
@@ -319,9 +324,9 @@ class ClosedLoop:
         predicted = self._predict_pose(frame.timestamp_s)
         front_end = self._front_end.step(frame, predicted)
         clock = StageClock()
-        with clock("odometry"):
+        with clock("odometry", self._slam):
             pose = self._slam.track(frame, front_end.masked)
-        with clock("map"):
+        with clock("map", self._slam):
             self._slam.update_map(frame, front_end.masked)
         if pose.T_world_camera is not None:
             if self._pose_feedback == "refined":

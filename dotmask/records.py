@@ -417,7 +417,7 @@ class PoseEstimate:
         timestamp_s: of the frame, seconds.
         T_world_camera: (4, 4) the estimated pose, or None when lost: no pose is ever made up.
         status: see SlamStatus.
-        inliers: features that agree with the pose.
+        inliers: features that agree with the pose, or None when the back end does not tell.
         covariance: (6, 6) of the pose's error as a twist in the camera's frame (rotation in radians, then translation
             in metres: `T_true = T_estimated exp(twist)`), or None when the back end does not tell.
     """
@@ -425,7 +425,7 @@ class PoseEstimate:
     timestamp_s: float
     T_world_camera: FloatArray | None
     status: SlamStatus
-    inliers: int
+    inliers: int | None
     covariance: FloatArray | None = None
 
     def __post_init__(self) -> None:

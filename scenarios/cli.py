@@ -223,7 +223,14 @@ def run(
     segmenter: Annotated[
         str | None, typer.Option(help="Segmenter: oracle, none. Default: oracle, of a folder none.")
     ] = None,
-    slam: Annotated[str, typer.Option(help="SLAM back end: embedded.")] = "embedded",
+    slam: Annotated[str, typer.Option(help="SLAM back end: embedded, rtabmap.")] = "embedded",
+    slam_parameters: Annotated[
+        str | None, typer.Option(help="Parameters of RTAB-Map: default, refined.", show_default="default")
+    ] = None,
+    slam_set: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=VALUE", help="Change one of them, e.g. Vis/MinInliers=12. May be repeated."),
+    ] = None,
     profile: Annotated[
         str, typer.Option(help="Parameters of the method: paper, calibrated. original: as the authors' program is.")
     ] = "calibrated",
@@ -261,6 +268,8 @@ def run(
     dotmask run --from runs/fast/scenario.json --out runs/again
 
     dotmask run data/rgbd_dataset_freiburg3_walking_xyz
+
+    dotmask run smoke --slam rtabmap --slam-parameters refined --slam-set Vis/MinInliers=12
     """
     from scenarios.report import expectation, maps, table, times
     from scenarios.run import RunSettings, default_out, free_folder, run_source
@@ -271,6 +280,8 @@ def run(
         methods=methods,
         segmenter=segmenter or ("none" if is_folder else "oracle"),
         slam=slam,
+        slam_parameters=slam_parameters,
+        slam_changes=slam_set or (),
         profile=profile,
         pose_feedback=pose_feedback,
         renderer=renderer,

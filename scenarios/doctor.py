@@ -10,6 +10,8 @@ from pathlib import Path
 import numpy as np
 
 import sim
+from dotmask.errors import SlamError
+from dotmask.slam.rtabmap.library import DEPTHAI_VERSION, core
 from scenarios.run_folder import versions
 from scenarios.world import RENDERERS
 from sim.assets import AssetState, verify_assets
@@ -91,6 +93,15 @@ def _renderer(name: str, is_needed: bool) -> Finding:
     )
 
 
+def _rtabmap() -> Finding:
+    what = "SLAM rtabmap"
+    try:
+        rtabmap = core()
+    except SlamError as error:
+        return Finding(what=what, said=str(error), is_well=False, is_needed=False)
+    return Finding(what=what, said=f"RTAB-Map {rtabmap.version} of depthai {DEPTHAI_VERSION}", is_well=True)
+
+
 def _wall(distance_m: float) -> SceneObject:
     """A square before a camera at the origin that looks along z, far larger than the image."""
     side = 10.0 * distance_m
@@ -113,6 +124,7 @@ EXAMINATIONS: tuple[Callable[[], Finding], ...] = (
     _threads,
     _default_renderer,
     _second_renderer,
+    _rtabmap,
 )
 
 

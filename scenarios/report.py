@@ -245,6 +245,7 @@ class Report(Part):
         frames: how many there were.
         renderer: that made the images; null for a recorded sequence.
         segmenter, slam, profile: how it was run.
+        slam_parameters: values that the SLAM back end was given beside its own.
         frame_hash: SHA-256 of the colour and depth images as the methods saw them.
         methods: the figures of each. What needs a truth that there is not (of a recorded sequence all but the
             trajectory's, without groundtruth.txt these too) is null.
@@ -258,6 +259,7 @@ class Report(Part):
     renderer: str | None
     segmenter: str
     slam: str
+    slam_parameters: dict[str, str] = {}
     profile: str
     frame_hash: str
     methods: dict[str, MethodReport]

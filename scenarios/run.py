@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, cast, get_args
 import cv2
 import numpy as np
 
-from dotmask.interfaces import Segmenter
+from dotmask.interfaces import Segmenter, SlamBackend
 from dotmask.mapping.settings import MappingSettings
 from dotmask.original import OriginalDotMask
 from dotmask.pipeline import ClosedLoop, DotMask, FrontEnd, MaskAll, Unmasked
@@ -20,6 +20,9 @@ from dotmask.profiles import ORIGINAL, PoseFeedback, Profile
 from dotmask.profiles import profile as get_profile
 from dotmask.records import FloatArray, RgbdFrame
 from dotmask.slam.embedded import EmbeddedSlam
+from dotmask.slam.rtabmap.backend import RtabmapSlam
+from dotmask.slam.rtabmap.library import core
+from dotmask.slam.rtabmap.settings import RtabmapSettings, rtabmap_settings
 from dotmask.tum import format_trajectory
 from scenarios.errors import ScenarioError, unknown
 from scenarios.judge import Judge
@@ -50,12 +53,24 @@ METHODS: dict[str, Callable[[Segmenter, Profile], FrontEnd]] = {
 """What may be compared: raw depth to both, all objects of interest removed from both, the method."""
 
 SEGMENTERS = ("oracle", "none")
-SLAM_BACKENDS = ("embedded",)
+SLAM_BACKENDS = ("embedded", "rtabmap")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunSettings:
-    """How a sequence is run; what happens in it is the scenario's own business."""
+    """How a sequence is run; what happens in it is the scenario's own business.
+
+    Attributes:
+        methods: of `METHODS`.
+        segmenter: of `SEGMENTERS`.
+        slam: of `SLAM_BACKENDS`.
+        profile: name of the method's parameters.
+        pose_feedback: see `ClosedLoop`.
+        renderer: of `RENDERERS`.
+        threads: of the renderer.
+        video: whether `video.mp4` is written.
+        rtabmap: parameters of RTAB-Map, None with another SLAM back end.
+    """
 
     methods: tuple[str, ...]
     segmenter: str
@@ -65,7 +80,8 @@ class RunSettings:
     renderer: str
     threads: int
     video: bool
-    with_map: bool
+    with_map: bool = False
+    rtabmap: RtabmapSettings | None = None
 
     @classmethod
     def parse(
@@ -80,6 +96,8 @@ class RunSettings:
         threads: int = 2,
         video: bool = False,
         with_map: bool = False,
+        slam_parameters: str | None = None,
+        slam_changes: Sequence[str] = (),
     ) -> "RunSettings":
         """Settings from the words of a command line.
 
@@ -88,6 +106,7 @@ class RunSettings:
         Raises:
             ScenarioError: a name that does not exist, with near matches; or methods that mask without a segmenter.
             dotmask.errors.ProfileError: no such profile.
+            dotmask.errors.SlamError: RTAB-Map cannot run here, or has no such parameter.
         """
         if methods is None:
             methods = "unmasked" if segmenter == "none" else ",".join(METHODS)
@@ -106,6 +125,9 @@ class RunSettings:
                 raise unknown(kind, name, known)
         if segmenter == "none" and chosen != ("unmasked",):
             raise ScenarioError(f"--methods {methods}: without a segmenter nothing is masked; leave only unmasked")
+        rtabmap = rtabmap_settings(slam_parameters or "default", slam_changes, core()) if slam == "rtabmap" else None
+        if rtabmap is None and (slam_parameters is not None or slam_changes):
+            raise ScenarioError(f"--slam-parameters and --slam-set are for --slam rtabmap, not {slam}")
         return cls(
             methods=chosen,
             segmenter=segmenter,
@@ -116,6 +138,7 @@ class RunSettings:
             threads=threads,
             video=video,
             with_map=with_map,
+            rtabmap=rtabmap,
         )
 
 
@@ -172,7 +195,7 @@ def run_source(source: Source, settings: RunSettings, out: Path, advance: Callab
                 start = np.eye(4) if truth.T_world_camera is None else truth.T_world_camera
                 chosen = get_profile(settings.profile)
                 loops = {
-                    name: closed_loop(METHODS[name](segmenter, chosen), settings, frame, start)
+                    name: closed_loop(METHODS[name](segmenter, chosen), settings, frame, start, folder.path / name)
                     for name in settings.methods
                 }
                 if settings.video:
@@ -200,6 +223,7 @@ def run_source(source: Source, settings: RunSettings, out: Path, advance: Callab
             renderer=source.renderer,
             segmenter=settings.segmenter,
             slam=settings.slam,
+            slam_parameters={} if settings.rtabmap is None else dict(settings.rtabmap.parameters),
             profile=settings.profile,
             frame_hash=digest.hexdigest(),
             methods={name: judge.report(slam_results[name], of_maps.get(name)) for name, judge in judges.items()},
@@ -236,7 +260,9 @@ def _map_maker(source: Source, settings: RunSettings) -> "MapMaker":
     return MapMaker(settings.methods, source.static_world(), MappingSettings())
 
 
-def closed_loop(front_end: FrontEnd, settings: RunSettings, first: RgbdFrame, T_world_camera: FloatArray) -> ClosedLoop:
+def closed_loop(
+    front_end: FrontEnd, settings: RunSettings, first: RgbdFrame, T_world_camera: FloatArray, files: Path
+) -> ClosedLoop:
     """The front end in a loop with the SLAM of the settings.
 
     Args:
@@ -244,8 +270,15 @@ def closed_loop(front_end: FrontEnd, settings: RunSettings, first: RgbdFrame, T_
         settings: how the scenario is run.
         first: the first frame.
         T_world_camera: (4, 4) its true pose, which fixes the world of the estimates.
+        files: folder and stem of the files that SLAM leaves.
     """
-    return ClosedLoop(front_end, EmbeddedSlam(first.intrinsics, T_world_camera), settings.pose_feedback, T_world_camera)
+    slam: SlamBackend
+    if settings.rtabmap is None:
+        slam = EmbeddedSlam(first.intrinsics, T_world_camera)
+    else:
+        database, log = (files.with_name(f"rtabmap_{files.name}.{kind}") for kind in ("db", "log"))
+        slam = RtabmapSlam(first.intrinsics, T_world_camera, settings.rtabmap, database, log)
+    return ClosedLoop(front_end, slam, settings.pose_feedback, T_world_camera)
 
 
 @contextmanager

@@ -7,6 +7,7 @@ import platform
 import shutil
 import tempfile
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self, TextIO
@@ -25,14 +26,19 @@ PACKAGES = (
     "gtsam",
     "pydantic",
 )
+RTABMAP_PACKAGE = "depthai"
+"""Holds RTAB-Map; the one package that need not be there."""
 
 
 def versions() -> dict[str, str]:
     """Versions of everything that can change a figure."""
+    installed = {name: importlib.metadata.version(name) for name in PACKAGES}
+    with suppress(importlib.metadata.PackageNotFoundError):
+        installed[RTABMAP_PACKAGE] = importlib.metadata.version(RTABMAP_PACKAGE)
     return {
         "python": platform.python_version(),
         "machine": f"{platform.system()} {platform.machine()}",
-        **{name: importlib.metadata.version(name) for name in PACKAGES},
+        **installed,
     }
 
 

@@ -40,11 +40,13 @@ END_TITLES = "the method as it is", "every stage true"
 class VariantRun:
     """One variant in closed loop with SLAM, and what is measured of it."""
 
-    def __init__(self, variant: Variant, settings: RunSettings, first: RgbdFrame, T_world_camera: FloatArray) -> None:
+    def __init__(
+        self, variant: Variant, settings: RunSettings, first: RgbdFrame, T_world_camera: FloatArray, folder: Path
+    ) -> None:
         self.variant = variant
         self._witness = Witness()
         front_end = build_front_end(variant.true_stages, self._witness, get_profile(settings.profile))
-        self._loop = closed_loop(front_end, settings, first, T_world_camera)
+        self._loop = closed_loop(front_end, settings, first, T_world_camera, folder / variant.name)
         self.judge = Judge(variant.name)
         self._meter = StepMeter()
         self.steps: list[Step] = []
@@ -90,7 +92,7 @@ def attribute(scenario: Scenario, settings: RunSettings, out: Path, advance: Cal
             segmenter.show(frame.index, truth)
             exact.show(frame.index, truth)
             if not runs:
-                runs = tuple(VariantRun(v, settings, frame, truth.T_world_camera) for v in VARIANTS)
+                runs = tuple(VariantRun(v, settings, frame, truth.T_world_camera, folder.path) for v in VARIANTS)
             found, true = (look(chosen, frame, truth, profile) for chosen in (segmenter, exact))
             sightings = [true if "masks" in run.variant.true_stages else found for run in runs]
             # Each variant has its own state, so the order in which they are done cannot matter.

@@ -1,12 +1,14 @@
 """The command line as its users meet it: results, contracts, and what bad input gets."""
 
 import csv
+import importlib.metadata
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+from dotmask.slam.rtabmap.library import core
 from dotmask.tum import read_trajectory
 from scenarios.registry import SCENARIOS
 from scenarios.report import Report
@@ -167,3 +169,29 @@ def test_a_bad_recording_names_file_and_line(name: str, tmp_path: Path, dotmask)
     assert "recorded.txt" in done.err
     assert place in done.err
     assert [p.name for p in tmp_path.iterdir()] == ["recorded.txt"]
+
+
+@pytest.mark.parametrize("option", ["--slam-parameters=refined", "--slam-set=Vis/MinInliers=12"])
+def test_parameters_of_rtabmap_are_for_rtabmap(dotmask, option: str) -> None:
+    done = dotmask("run", "smoke", option)
+    assert done.code == 2
+    assert done.err == "dotmask: --slam-parameters and --slam-set are for --slam rtabmap, not embedded\n"
+
+
+def test_rtabmap_that_is_not_installed_is_one_line_before_anything_is_rendered(
+    dotmask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    find = importlib.metadata.distribution
+
+    def without_depthai(name: str) -> importlib.metadata.Distribution:
+        return find("no-such-package" if name == "depthai" else name)
+
+    monkeypatch.setattr(importlib.metadata, "distribution", without_depthai)
+    core.cache_clear()
+    done = dotmask("run", "smoke", "--slam", "rtabmap", "--out", tmp_path / "out")
+    assert done.code == 2
+    assert "pip install 'dotmask[rtabmap]'" in done.err or "x86-64 Linux only" in done.err
+    assert done.err.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+    assert "-   SLAM rtabmap: RTAB-Map" in dotmask("doctor").out
+    core.cache_clear()

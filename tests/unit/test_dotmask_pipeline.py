@@ -10,7 +10,7 @@ import pytest
 from dotmask.geometry import inverse, transform
 from dotmask.mask_geometry import dilated_patch
 from dotmask.masking import growth_px
-from dotmask.pipeline import ClosedLoop, DotMask, MaskAll, Unmasked, extrapolate
+from dotmask.pipeline import ClosedLoop, DotMask, MaskAll, StageClock, Unmasked, extrapolate
 from dotmask.profiles import MaskGrowth, PoseFeedback, profile
 from dotmask.records import (
     Detections,
@@ -279,3 +279,16 @@ def test_association_and_classification_can_be_replaced() -> None:
     assert [t.track_id for t in result.tracks] == [1, 2, 3]
     assert [t.verdict and t.verdict.speed_m_s for t in result.tracks] == [1.0, 2.0, 3.0]
     assert (result.masked.mo_mdi_m[mask_at(2, 0.0)] == 0).all(), "idle, but said to move"
+
+
+def test_what_slam_has_done_elsewhere_counts() -> None:
+    class Elsewhere:
+        cpu_elsewhere_s = 1.0
+
+    part, clock = Elsewhere(), StageClock()
+    with clock("odometry", part):
+        part.cpu_elsewhere_s += 7.0
+    with clock("map", object()):
+        pass
+    assert 7.0 <= clock.seconds["odometry"] < 7.5
+    assert clock.seconds["map"] < 0.5

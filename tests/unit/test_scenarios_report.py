@@ -61,8 +61,8 @@ REPORT = Report(
 def test_report_json_follows_the_contract() -> None:
     tree = json.loads(REPORT.to_json())
     assert list(tree) == [
-        "schema", "scenario", "seed", "frames", "renderer", "segmenter", "slam", "profile", "frame_hash", "methods",
-        "time_ms",
+        "schema", "scenario", "seed", "frames", "renderer", "segmenter", "slam", "slam_parameters", "profile",
+        "frame_hash", "methods", "time_ms",
     ]  # fmt: skip
     assert tree["schema"] == 1
     assert tree["time_ms"] == {"render": 20.0}
