@@ -15,3 +15,7 @@ class ProfileError(DotmaskError):
 
 class SequenceFolderError(DotmaskError):
     """A folder in the TUM RGB-D format cannot be read or written."""
+
+
+class VocabularyError(DotmaskError):
+    """The visual vocabulary of place recognition is missing or damaged."""
