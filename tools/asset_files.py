@@ -33,7 +33,9 @@ def update_manifest(root: Path, name: str, *, source: str, licence: str, changes
     Args:
         root: the asset folder.
         name: path of the file below it.
-        source, licence, changes: see `sim.assets.AssetRecord`.
+        source: see `sim.assets.AssetRecord`.
+        licence: likewise.
+        changes: likewise.
     """
     content = (root / name).read_bytes()
     path = root / "manifest.json"

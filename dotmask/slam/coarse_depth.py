@@ -59,7 +59,7 @@ class CoarseDepth:
     def points_camera(self) -> FloatArray:
         """(N, 3) the samples that have depth, metres."""
         v, u = np.nonzero(self.depth_m)
-        pixels = np.stack([u, v], axis=1) * float(self.step_px)
+        pixels = (np.stack([u, v], axis=1) * self.step_px).astype(np.float64)
         return back_project(pixels, self.depth_m[v, u].astype(np.float64), self.intrinsics)
 
     @cached_property

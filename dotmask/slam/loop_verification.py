@@ -11,19 +11,22 @@
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from dotmask.geometry import inverse, project, transform
 from dotmask.records import FloatArray, Intrinsics
 from dotmask.slam.features import Features
 from dotmask.slam.keyframes import Keyframe, motion
-from dotmask.slam.matching import Matches, match_anywhere, match_near
+from dotmask.slam.matching import Matches, match_near, match_within_groups
 from dotmask.slam.pose_solver import PoseSolver
 from dotmask.slam.settings import REFERENCE_WIDTH_PX, LoopSettings, OdometrySettings
 from dotmask.slam.twists import cross, halfway
+from dotmask.slam.vocabulary import Vocabulary
 
 CELLS = (6, 8)
 """Rows and columns that an image is divided into, to see whether inliers are spread over it."""
+
+GROUP_DEPTH = 2
+"""Down to which level of the vocabulary two descriptors must be alike to be compared at all."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -47,12 +50,15 @@ class LoopVerifier:
 
     Args:
         intrinsics: of the camera.
+        vocabulary: descriptors are compared with those of the same branch of its tree.
         settings: of the features.
         loop_settings: what a loop must fulfil.
     """
 
-    def __init__(self, intrinsics: Intrinsics, settings: OdometrySettings, loop_settings: LoopSettings) -> None:
-        self._camera, self._settings = intrinsics, loop_settings
+    def __init__(
+        self, intrinsics: Intrinsics, vocabulary: Vocabulary, settings: OdometrySettings, loop_settings: LoopSettings
+    ) -> None:
+        self._camera, self._vocabulary, self._settings = intrinsics, vocabulary, loop_settings
         self._solver = PoseSolver(intrinsics, settings)
         self._scale = intrinsics.width / REFERENCE_WIDTH_PX
 
@@ -66,7 +72,7 @@ class LoopVerifier:
         first = self._solver.solve(
             p_to[matches[:, 0]], features_from.pixels[matches[:, 1]], features_from.depth_m[matches[:, 1]]
         )
-        if first is None:
+        if first is None or len(first.inliers) < self._settings.min_match_share * len(matches):
             return None
         forward = self._directed(first.T_camera_world, p_to, features_to, features_from)
         backward = self._directed(inverse(first.T_camera_world), p_from, features_from, features_to)
@@ -90,12 +96,14 @@ class LoopVerifier:
 
     def _mutual(self, a: Features, b: Features) -> Matches:
         """Matches (M, 2) of corners of `a` and `b` that are each other's best."""
-        s = self._settings
-        there = match_anywhere(a.descriptors, b, max_hamming=s.max_hamming, ratio=s.ratio)
-        back = match_anywhere(b.descriptors, a, max_hamming=s.max_hamming, ratio=s.ratio)
-        chosen = np.full(len(b), -1, np.intp)
-        chosen[back[:, 0]] = back[:, 1]
-        return there[chosen[there[:, 1]] == there[:, 0]]
+        return match_within_groups(
+            a.descriptors,
+            self._vocabulary.nodes_of(a.descriptors, GROUP_DEPTH),
+            b.descriptors,
+            self._vocabulary.nodes_of(b.descriptors, GROUP_DEPTH),
+            max_hamming=self._settings.max_hamming,
+            ratio=self._settings.ratio,
+        )
 
     def _directed(
         self, T_seen_points: FloatArray, points: FloatArray, of_points: Features, seen: Features
@@ -142,7 +150,9 @@ class LoopVerifier:
         dY = np.concatenate([-R @ cross(points), np.broadcast_to(R, (len(points), 3, 3))], axis=2)
         x, y, z = transform(T_from_to, points).T
         # One over the standard deviation, of u, v and depth; depth has an error in both images.
-        sharp_u, sharp_v = (f / (self._settings.pixel_sigma_px * self._scale * z) for f in (self._camera.fx, self._camera.fy))
+        sharp_u, sharp_v = (
+            f / (self._settings.pixel_sigma_px * self._scale * z) for f in (self._camera.fx, self._camera.fy)
+        )
         sharp_z = 1.0 / (np.sqrt(2.0) * self._solver.depth_sigma(z))
         rows = np.concatenate(
             [
@@ -154,10 +164,12 @@ class LoopVerifier:
         # einsum of two operands sums in a fixed order; a BLAS product may not, for another number of threads.
         information = np.einsum("ni,nj->ij", rows, rows)
         regular = information + 1e-9 * np.trace(information) * np.eye(6)
-        covariance = self._settings.covariance_scale * np.linalg.inv(regular)
+        covariance = np.linalg.inv(regular)
         return np.asarray((covariance + covariance.T) / 2)
 
     def _surfaces_agree(self, seen: Keyframe, other: Keyframe, T_seen_other: FloatArray) -> bool:
         s = self._settings
         found = seen.depth.agreement(other.depth, T_seen_other, s.depth_tolerance)
-        return found.overlap >= s.min_overlap and found.agreeing >= s.min_agreeing and found.violating <= s.max_violating
+        return (
+            found.overlap >= s.min_overlap and found.agreeing >= s.min_agreeing and found.violating <= s.max_violating
+        )

@@ -65,7 +65,7 @@ class PlaceRecognition:
         del self._places[column]
 
     def similarities(self, bag: BagOfWords) -> npt.NDArray[np.float32]:
-        """Similarity of `bag` to each place, in the order of their numbers: `1 - |v - w|_1 / 2`."""
+        """Similarity of `bag` to each place, in the order of their numbers, see `BagOfWords.similarity`."""
         known = self._weights[bag.words, : len(self._places)]
         return np.asarray(np.minimum(known, bag.weights[:, None]).sum(axis=0))
 

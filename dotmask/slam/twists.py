@@ -31,9 +31,7 @@ def cross(vectors: FloatArray) -> FloatArray:
     """(..., 3, 3) matrices of the products `vector x ...` of vectors (..., 3)."""
     x, y, z = np.moveaxis(vectors, -1, 0)
     zero = np.zeros_like(x)
-    return np.stack(
-        [np.stack([zero, -z, y], -1), np.stack([z, zero, -x], -1), np.stack([-y, x, zero], -1)], axis=-2
-    )
+    return np.stack([np.stack([zero, -z, y], -1), np.stack([z, zero, -x], -1), np.stack([-y, x, zero], -1)], axis=-2)
 
 
 def _left_jacobian(w: FloatArray) -> FloatArray:

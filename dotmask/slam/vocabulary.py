@@ -36,6 +36,11 @@ class BagOfWords:
     words: WordIds
     weights: Weights
 
+    def similarity(self, other: "BagOfWords") -> float:
+        """Share of the weight that both have, 0 to 1: `1 - |v - w|_1 / 2`."""
+        _, mine, others = np.intersect1d(self.words, other.words, assume_unique=True, return_indices=True)
+        return float(np.minimum(self.weights[mine], other.weights[others]).sum())
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Vocabulary:
@@ -68,10 +73,14 @@ class Vocabulary:
 
     def words_of(self, descriptors: Descriptors) -> WordIds:
         """The word of each descriptor (N, 32): (N,). Among centres of one distance, the first."""
+        return self.nodes_of(descriptors, len(self.levels))
+
+    def nodes_of(self, descriptors: Descriptors, depth: int) -> WordIds:
+        """The node of each descriptor (N, 32) after `depth` levels, at least 1: (N,)."""
         branches = len(self.levels[0])
         given = np.ascontiguousarray(descriptors).view(np.uint64)
         node = np.zeros(len(given), np.intp)
-        for nodes in self.levels:
+        for nodes in self.levels[:depth]:
             centres = nodes.view(np.uint64).reshape(-1, branches, 4)[node]
             differing = np.bitwise_count(centres ^ given[:, None, :]).sum(axis=2, dtype=np.int64)
             node = node * branches + differing.argmin(axis=1)
@@ -116,4 +125,6 @@ def read_vocabulary(path: Path) -> Vocabulary:
             depth = sum(name.startswith("level_") for name in file.files)
             return Vocabulary(levels=tuple(file[f"level_{k}"] for k in range(depth)), idf=file["idf"])
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
-        raise VocabularyError(f"the visual vocabulary {path} cannot be read ({error}): reinstall the package") from error
+        raise VocabularyError(
+            f"the visual vocabulary {path} cannot be read ({error}): reinstall the package"
+        ) from error

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 from dotmask.geometry import inverse, project, transform
 from dotmask.records import Intrinsics
 from dotmask.slam.features import Features
-from dotmask.slam.keyframes import KeyframeStore
+from dotmask.slam.keyframes import Keyframe, KeyframeStore
 from dotmask.slam.local_map import LocalMap
 from dotmask.slam.matching import match_anywhere, match_near
 from dotmask.slam.pose_solver import PoseSolver
@@ -169,11 +169,11 @@ def test_local_map_points_are_running_means_of_limited_depth():
     np.testing.assert_allclose(local_map.p_world, np.full((1, 3), wanted))
 
 
-def add_keyframe(store: KeyframeStore, index: int, x_m: float) -> None:
+def add_keyframe(store: KeyframeStore, index: int, x_m: float) -> Keyframe | None:
     T = np.eye(4)
     T[0, 3] = x_m
     features = features_at(np.full((2, 2), 100.0), np.zeros((2, 32), np.uint8))
-    store.add(index, float(index), T, features)
+    return store.add(index, float(index), T, features, np.zeros((480, 640), np.float32))
 
 
 def test_keyframe_is_due_after_motion_or_rotation():
@@ -190,8 +190,8 @@ def test_keyframe_is_due_after_motion_or_rotation():
 
 def test_most_redundant_keyframe_goes_first_and_both_ends_stay():
     store = KeyframeStore(CAMERA, OdometrySettings(max_keyframes=4))
-    for index, x_m in enumerate([0.0, 1.0, 1.1, 2.0, 4.0]):
-        add_keyframe(store, index, x_m)
+    dropped = [add_keyframe(store, index, x_m) for index, x_m in enumerate([0.0, 1.0, 1.1, 2.0, 4.0])]
+    assert [keyframe.number for keyframe in dropped if keyframe is not None] == [2]
     # Without 1 there is a gap of 1.1 m, without 2 of 1.0 m, without 3 of 2.9 m.
     assert [keyframe.frame_index for keyframe in store.keyframes] == [0, 1, 3, 4]
 

@@ -25,8 +25,8 @@ CAMERA = CameraModel(width=640, height=480, fx=535.4, fy=539.2, cx=320.1, cy=247
 SOURCE = "made by tools/train_vocabulary"
 LICENCE = "CC0-1.0"
 CHANGES = (
-    f"tree of {BRANCHES}^{DEPTH} binary words by k-majority on the ORB descriptors of {ROOMS * VIEWS} rendered images of "
-    "random rooms, none of which is in a scenario"
+    f"tree of {BRANCHES}^{DEPTH} binary words by k-majority on the ORB descriptors of {ROOMS * VIEWS} rendered images "
+    "of random rooms, none of which is in a scenario"
 )
 
 

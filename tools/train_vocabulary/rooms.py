@@ -68,7 +68,7 @@ def random_views(number: int, seed: int, count: int) -> list[FloatArray]:
     for _ in range(count):
         eye = np.array([*(rng.uniform(-0.8, 0.8, 2) * half), rng.uniform(0.7, 1.8)])
         angle = rng.uniform(0, 2 * np.pi)
-        views.append(look_at(eye, eye + [np.cos(angle), np.sin(angle), rng.uniform(-0.6, 0.15)]))
+        views.append(look_at(eye, eye + np.array([np.cos(angle), np.sin(angle), rng.uniform(-0.6, 0.15)])))
     return views
 
 
