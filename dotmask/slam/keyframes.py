@@ -4,9 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial.transform import Rotation
 
-from dotmask.geometry import back_project, inverse
+from dotmask.geometry import back_project
 from dotmask.records import DepthImage, FloatArray, Intrinsics
 from dotmask.slam.coarse_depth import CoarseDepth
 from dotmask.slam.features import Descriptors, Features
@@ -70,7 +69,8 @@ class KeyframeStore:
         if not self._keyframes:
             return True
         distance_m, angle_rad = motion(self._keyframes[-1].T_world_camera, T_world_camera)
-        return distance_m >= self._settings.keyframe_distance_m or angle_rad >= self._settings.keyframe_angle_rad
+        s = self._settings
+        return bool(distance_m >= s.keyframe_distance_m or angle_rad >= s.keyframe_angle_rad)
 
     def add(
         self,
@@ -111,15 +111,18 @@ class KeyframeStore:
 
     def _most_redundant(self) -> int:
         """Index of the keyframe whose removal leaves the smallest gap; never the first or the last."""
-        gaps = []
-        for before, after in zip(self._keyframes[:-2], self._keyframes[2:], strict=True):
-            distance_m, angle_rad = motion(before.T_world_camera, after.T_world_camera)
-            s = self._settings
-            gaps.append(distance_m / s.keyframe_distance_m + angle_rad / s.keyframe_angle_rad)
+        T_world_camera = np.array([keyframe.T_world_camera for keyframe in self._keyframes])
+        distance_m, angle_rad = motion(T_world_camera[:-2], T_world_camera[2:])
+        gaps = distance_m / self._settings.keyframe_distance_m + angle_rad / self._settings.keyframe_angle_rad
         return int(np.argmin(gaps)) + 1
 
 
-def motion(T_world_a: FloatArray, T_world_b: FloatArray) -> tuple[float, float]:
-    """Distance in metres and angle in radians between two poses (4, 4)."""
-    T_a_b = inverse(T_world_a) @ T_world_b
-    return float(np.linalg.norm(T_a_b[:3, 3])), float(Rotation.from_matrix(T_a_b[:3, :3]).magnitude())
+def motion(T_world_a: FloatArray, T_world_b: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Distance in metres and angle in radians between poses (..., 4, 4), each (...)."""
+    distance_m = np.linalg.norm(T_world_b[..., :3, 3] - T_world_a[..., :3, 3], axis=-1)
+    R_a_b = np.swapaxes(T_world_a[..., :3, :3], -1, -2) @ T_world_b[..., :3, :3]
+    # Twice the cosine from the trace, twice the sine from what is not symmetric: good for small and large angles.
+    cosine = np.trace(R_a_b, axis1=-2, axis2=-1) - 1
+    skew = R_a_b - np.swapaxes(R_a_b, -1, -2)
+    sine = np.sqrt(skew[..., 2, 1] ** 2 + skew[..., 0, 2] ** 2 + skew[..., 1, 0] ** 2)
+    return distance_m, np.arctan2(sine, cosine)

@@ -130,17 +130,17 @@ class LoopClosing:
         least = s.relative_similarity * bag.similarity(self._last_bag)
         alike = self._places.similar(bag, before=before, count=s.candidates, least=least)
         found = [(LoopKind.GLOBAL, self._keyframes[place.place]) for place in alike]
-        tried = {place.place for place in alike}
-        nearest: tuple[float, Keyframe] | None = None
-        for number, earlier in self._keyframes.items():
-            if number >= before or number in tried:
-                continue
-            distance_m, angle_rad = motion(earlier.T_world_camera, keyframe.T_world_camera)
-            if distance_m > s.proximity_distance_m or angle_rad > s.proximity_angle_rad:
-                continue
-            apart = distance_m / s.proximity_distance_m + angle_rad / s.proximity_angle_rad
-            if nearest is None or apart < nearest[0]:
-                nearest = apart, earlier
-        if nearest is not None:
-            found.append((LoopKind.PROXIMITY, nearest[1]))
-        return found
+        nearest = self._nearest(keyframe, before, {place.place for place in alike})
+        return found if nearest is None else [*found, (LoopKind.PROXIMITY, nearest)]
+
+    def _nearest(self, keyframe: Keyframe, before: int, tried: set[int]) -> Keyframe | None:
+        """The keyframe nearest by odometry among those before number `before` and not `tried`; None if all are far."""
+        others = [other for number, other in self._keyframes.items() if number < before and number not in tried]
+        if not others:
+            return None
+        s = self._settings
+        T_world_camera = np.array([other.T_world_camera for other in others])
+        distance_m, angle_rad = motion(T_world_camera, keyframe.T_world_camera)
+        apart = np.maximum(distance_m / s.proximity_distance_m, angle_rad / s.proximity_angle_rad)
+        best = int(apart.argmin())
+        return others[best] if apart[best] <= 1 else None

@@ -1,5 +1,6 @@
 """Which keyframes look like this one: bags of visual words, compared as in DBoW2 (Galvez-Lopez & Tardos, T-RO 2012)."""
 
+from bisect import bisect_left
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,19 +70,22 @@ class PlaceRecognition:
         known = self._weights[bag.words, : len(self._places)]
         return np.asarray(np.minimum(known, bag.weights[:, None]).sum(axis=0))
 
-    def similar(self, bag: BagOfWords, *, before: int, count: int, least: float) -> tuple[SimilarPlace, ...]:
+    def similar(
+        self, bag: BagOfWords, *, count: int, least: float = 0.0, before: int | None = None
+    ) -> tuple[SimilarPlace, ...]:
         """The places most similar to `bag`, the best first; of a run of places in a row, the best one alone.
 
         Args:
             bag: the words of the image.
-            before: places with this number and later ones are left out.
             count: at most this many.
             least: with a similarity of at least this.
+            before: places with this number and later ones are left out; None for an image that has no place yet.
         """
-        places = np.array(self._places[: np.searchsorted(self._places, before)], np.intp)
-        scores = self.similarities(bag)[: len(places)]
+        known = len(self._places) if before is None else bisect_left(self._places, before)
+        places = np.array(self._places[:known], np.intp)
+        scores = self.similarities(bag)[:known]
         padded = np.concatenate([[-np.inf], scores, [-np.inf]])
         # One look at a place leaves several keyframes that are about as similar; a local maximum stands for them.
         peaks = np.flatnonzero((scores >= least) & (scores > padded[:-2]) & (scores >= padded[2:]))
-        best = peaks[np.lexsort((-places[peaks], -scores[peaks]))][:count]
+        best = peaks[np.argsort(-scores[peaks], kind="stable")][:count]
         return tuple(SimilarPlace(place=int(places[k]), similarity=float(scores[k])) for k in best)
