@@ -135,19 +135,13 @@ class EmbeddedSlam:
 
     def finish(self) -> SlamResult:
         """The poses of all frames that were not lost, with the loops closed: each moves with the keyframe before it."""
-        closed = self._loops.close()
-        poses = self._poses
-        keyframe = np.searchsorted(closed.frame_indices, [pose.frame_index for pose in poses], side="right") - 1
+        closed, poses = self._loops.close(), self._poses
         return SlamResult(
             trajectory=Trajectory(
                 timestamps_s=np.array([pose.timestamp_s for pose in poses], np.float64),
-                T_world_camera=np.array(
-                    [
-                        closed.T_optimised_odometry[k] @ pose.T_world_camera
-                        for k, pose in zip(keyframe, poses, strict=True)
-                    ],
-                    np.float64,
-                ).reshape(-1, 4, 4),
+                T_world_camera=closed.corrected(
+                    [pose.frame_index for pose in poses], [pose.T_world_camera for pose in poses]
+                ),
             ),
             loops=closed.loops,
         )

@@ -4,6 +4,7 @@ What is bounded by `OdometrySettings.max_keyframes` is what is large: corners, d
 of all keyframes stay, like those of all frames, so that a dropped keyframe takes none of its loops away.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,13 +33,24 @@ class ClosedLoops:
 
     Attributes:
         frame_indices: (N,) of all keyframes there ever were, rising.
-        T_optimised_odometry: (N, 4, 4) what to put before an odometry pose near each of them.
+        T_world_odometry: (N, 4, 4) how each of them was moved: the optimised pose is this times odometry's.
         loops: the accepted loops in the order of their discovery.
     """
 
     frame_indices: tuple[int, ...]
-    T_optimised_odometry: FloatArray
+    T_world_odometry: FloatArray
     loops: tuple[LoopClosure, ...]
+
+    def corrected(self, frame_indices: Sequence[int], T_odometry_camera: Sequence[FloatArray]) -> FloatArray:
+        """The optimised poses (M, 4, 4) of frames: each keeps its place relative to the last keyframe not after it.
+
+        Args:
+            frame_indices: M of them, none before the first keyframe.
+            T_odometry_camera: their poses (4, 4) by odometry.
+        """
+        keyframe = np.searchsorted(self.frame_indices, frame_indices, side="right") - 1
+        poses = [self.T_world_odometry[k] @ T for k, T in zip(keyframe, T_odometry_camera, strict=True)]
+        return np.array(poses, np.float64).reshape(-1, 4, 4)
 
 
 def odometry_covariance(T_before: FloatArray, T_after: FloatArray, settings: LoopSettings) -> FloatArray:
@@ -116,7 +128,7 @@ class LoopClosing:
         corrections = [T @ inverse(before) for T, before in zip(found.T_world_node, poses, strict=True)]
         return ClosedLoops(
             frame_indices=tuple(self._frame_indices),
-            T_optimised_odometry=np.array(corrections).reshape(-1, 4, 4),
+            T_world_odometry=np.array(corrections).reshape(-1, 4, 4),
             loops=tuple(
                 loop.closure for loop, accepted in zip(self._loops, found.is_accepted, strict=True) if accepted
             ),

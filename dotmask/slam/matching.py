@@ -78,7 +78,8 @@ def match_within_groups(
         other_descriptors: (K, 32).
         other_groups: (K,).
         max_hamming: most differing bits.
-        ratio: seen from either side, the nearest must be nearer than this times the second nearest of the group.
+        ratio: seen from either side, the nearest must be nearer than this times the second nearest of the group; at
+            most 1.
     """
     order = np.argsort(other_groups, kind="stable")
     ends = np.searchsorted(other_groups[order], np.arange(max(groups.max(initial=0), other_groups.max(initial=0)) + 2))
@@ -93,11 +94,12 @@ def match_within_groups(
 
     best, second = _best_two(one, (hamming << 32) | other, len(groups))
     back = np.argsort(other, kind="stable")
-    best_back, second_back = _best_two(other[back], ((hamming << 32) | one)[back], len(other_groups))
+    _, second_back = _best_two(other[back], ((hamming << 32) | one)[back], len(other_groups))
     distance, nearest = best >> 32, best & 0xFFFFFFFF
     candidates = np.flatnonzero((distance <= max_hamming) & (distance < ratio * (second >> 32)))
     to = nearest[candidates]
-    mutual = ((best_back[to] & 0xFFFFFFFF) == candidates) & (distance[candidates] < ratio * (second_back[to] >> 32))
+    # Nearer than the second best of the other side: then it is the other side's best.
+    mutual = distance[candidates] < ratio * (second_back[to] >> 32)
     return np.stack([candidates[mutual], to[mutual]], axis=1).astype(np.intp)
 
 

@@ -75,6 +75,8 @@ class PlaceRecognition:
     ) -> tuple[SimilarPlace, ...]:
         """The places most similar to `bag`, the best first; of a run of places in a row, the best one alone.
 
+        A place that has no word of `bag` is never similar.
+
         Args:
             bag: the words of the image.
             count: at most this many.
@@ -86,6 +88,7 @@ class PlaceRecognition:
         scores = self.similarities(bag)[:known]
         padded = np.concatenate([[-np.inf], scores, [-np.inf]])
         # One look at a place leaves several keyframes that are about as similar; a local maximum stands for them.
-        peaks = np.flatnonzero((scores >= least) & (scores > padded[:-2]) & (scores >= padded[2:]))
+        enough = (scores >= least) & (scores > 0)
+        peaks = np.flatnonzero(enough & (scores > padded[:-2]) & (scores >= padded[2:]))
         best = peaks[np.argsort(-scores[peaks], kind="stable")][:count]
         return tuple(SimilarPlace(place=int(places[k]), similarity=float(scores[k])) for k in best)

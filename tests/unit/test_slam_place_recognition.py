@@ -85,5 +85,6 @@ def test_numbers_must_rise(vocabulary):
 
 def test_nothing_is_similar_to_nothing(vocabulary):
     (bag,) = bags(1, 7)
-    places = PlaceRecognition(vocabulary)
-    assert places.similar(bag, count=3) == ()
+    empty = BagOfWords(words=np.zeros(0, np.intp), weights=np.zeros(0, np.float32))
+    assert PlaceRecognition(vocabulary).similar(bag, count=3) == ()
+    assert known(vocabulary, [bag, empty]).similar(empty, count=3) == ()
