@@ -76,7 +76,8 @@ class EmbeddedSlam:
         self._extractor = FeatureExtractor(intrinsics, settings)
         self._odometry = Odometry(intrinsics, start, settings)
         self._store = KeyframeStore(intrinsics, settings)
-        self._loops = LoopClosing(intrinsics, load_vocabulary(), settings, loop_settings)
+        self._vocabulary = load_vocabulary()
+        self._loops = LoopClosing(intrinsics, self._vocabulary, settings, loop_settings)
         self._started = False
         self._last_time_s: float | None = None
         self._seen: _Seen | None = None
@@ -130,7 +131,8 @@ class EmbeddedSlam:
         # Where both depths are masked alike, odometry has found the corners already.
         same = np.array_equal(masked.mdi_m, masked.mo_mdi_m)
         features = seen.features if same else self._extractor.extract(seen.grey, masked.mdi_m)
-        dropped = self._store.add(frame.index, frame.timestamp_s, seen.T_world_camera, features, masked.mdi_m)
+        words = self._vocabulary.words_of(features.descriptors)
+        dropped = self._store.add(frame.index, frame.timestamp_s, seen.T_world_camera, features, words, masked.mdi_m)
         self._loops.add(self._store.keyframes[-1], dropped)
 
     def finish(self) -> SlamResult:

@@ -10,6 +10,7 @@ from dotmask.records import DepthImage, FloatArray, Intrinsics
 from dotmask.slam.coarse_depth import CoarseDepth
 from dotmask.slam.features import Descriptors, Features
 from dotmask.slam.settings import OdometrySettings
+from dotmask.slam.vocabulary import WordIds
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -24,6 +25,7 @@ class Keyframe:
         pixels: (N, 2) float32, corners where the mapping depth (MDI) is valid.
         p_camera: (N, 3) float32, their positions in the camera frame, metres.
         descriptors: (N, 32) uint8.
+        words: (N,) the visual word of each.
         depth: samples of the mapping depth.
     """
 
@@ -34,6 +36,7 @@ class Keyframe:
     pixels: npt.NDArray[np.float32]
     p_camera: npt.NDArray[np.float32]
     descriptors: Descriptors
+    words: WordIds
     depth: CoarseDepth
 
     @property
@@ -78,6 +81,7 @@ class KeyframeStore:
         timestamp_s: float,
         T_world_camera: FloatArray,
         features: Features,
+        words: WordIds,
         depth_m: DepthImage,
     ) -> Keyframe | None:
         """Append a keyframe; beyond the bound, the one whose neighbours are nearest to each other is dropped.
@@ -87,6 +91,7 @@ class KeyframeStore:
             timestamp_s: of the frame.
             T_world_camera: (4, 4) its pose by odometry.
             features: its corners in the mapping depth.
+            words: (N,) their visual words.
             depth_m: (H, W) the mapping depth.
 
         Returns:
@@ -101,6 +106,7 @@ class KeyframeStore:
                 pixels=features.pixels.astype(np.float32),
                 p_camera=back_project(features.pixels, features.depth_m, self._camera).astype(np.float32),
                 descriptors=features.descriptors,
+                words=words,
                 depth=CoarseDepth.of(depth_m, self._camera),
             )
         )

@@ -74,8 +74,8 @@ class LoopClosing:
     def __init__(
         self, intrinsics: Intrinsics, vocabulary: Vocabulary, settings: OdometrySettings, loop_settings: LoopSettings
     ) -> None:
-        self._settings = loop_settings
-        self._places = PlaceRecognition(vocabulary)
+        self._settings, self._vocabulary = loop_settings, vocabulary
+        self._places = PlaceRecognition(len(vocabulary))
         self._verifier = LoopVerifier(intrinsics, vocabulary, settings, loop_settings)
         self._keyframes: dict[int, Keyframe] = {}
         self._frame_indices: list[int] = []
@@ -93,7 +93,7 @@ class LoopClosing:
         if dropped is not None:
             del self._keyframes[dropped.number]
             self._places.forget(dropped.number)
-        bag = self._places.bag_of(keyframe.descriptors)
+        bag = self._vocabulary.bag_of(keyframe.words)
         for kind, earlier in self._candidates(keyframe, bag):
             found = self._verifier.verify(keyframe, earlier)
             if found is not None:

@@ -1,6 +1,6 @@
 """Do two keyframes show the same place, and from where? Corners, both directions, and surfaces must agree.
 
-1. Descriptors are matched without any guess, each way, and what both ways found is kept.
+1. Descriptors are matched without any guess, among those whose words are alike; each must be the other's best.
 2. PnP RANSAC finds a relative pose; around where it expects each corner the matching is done again.
 3. The pose is solved in both directions, each on its own corners and depth. The two must agree with each other; the
    answer is the one halfway between them.
@@ -25,9 +25,6 @@ from dotmask.slam.vocabulary import Vocabulary
 CELLS = (6, 8)
 """Rows and columns that an image is divided into, to see whether inliers are spread over it."""
 
-GROUP_DEPTH = 2
-"""Down to which level of the vocabulary two descriptors must be alike to be compared at all."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class VerifiedLoop:
@@ -50,7 +47,7 @@ class LoopVerifier:
 
     Args:
         intrinsics: of the camera.
-        vocabulary: descriptors are compared with those of the same branch of its tree.
+        vocabulary: of the words; only descriptors whose words are alike are compared.
         settings: of the features.
         loop_settings: what a loop must fulfil.
     """
@@ -66,7 +63,14 @@ class LoopVerifier:
         """The pose of `earlier` in the camera of `later`, or None."""
         features_from, features_to = later.features, earlier.features
         p_from, p_to = later.p_camera.astype(np.float64), earlier.p_camera.astype(np.float64)
-        matches = self._mutual(features_to, features_from)
+        matches = match_within_groups(
+            features_to.descriptors,
+            self._vocabulary.parents_of(earlier.words),
+            features_from.descriptors,
+            self._vocabulary.parents_of(later.words),
+            max_hamming=self._settings.max_hamming,
+            ratio=self._settings.ratio,
+        )
         if len(matches) < self._settings.min_inliers // 2:
             return None
         first = self._solver.solve(
@@ -93,17 +97,6 @@ class LoopVerifier:
         ):
             return None
         return VerifiedLoop(T_from_to=T_from_to, covariance=covariance, inliers=len(to))
-
-    def _mutual(self, a: Features, b: Features) -> Matches:
-        """Matches (M, 2) of corners of `a` and `b` that are each other's best."""
-        return match_within_groups(
-            a.descriptors,
-            self._vocabulary.nodes_of(a.descriptors, GROUP_DEPTH),
-            b.descriptors,
-            self._vocabulary.nodes_of(b.descriptors, GROUP_DEPTH),
-            max_hamming=self._settings.max_hamming,
-            ratio=self._settings.ratio,
-        )
 
     def _directed(
         self, T_seen_points: FloatArray, points: FloatArray, of_points: Features, seen: Features

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from dotmask.slam.features import Descriptors
-from dotmask.slam.vocabulary import BagOfWords, Vocabulary
+from dotmask.slam.vocabulary import BagOfWords
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,22 +26,17 @@ class PlaceRecognition:
     """The words of all places, by number.
 
     Args:
-        vocabulary: the words.
+        words: how many words there are.
     """
 
-    def __init__(self, vocabulary: Vocabulary) -> None:
-        self._vocabulary = vocabulary
+    def __init__(self, words: int) -> None:
         # A column for each place, so that the words of a query are whole rows; grown by doubling.
-        self._weights = np.zeros((len(vocabulary), 16), np.float32)
+        self._weights = np.zeros((words, 16), np.float32)
         self._places: list[int] = []
 
     def __len__(self) -> int:
         """How many places are known."""
         return len(self._places)
-
-    def bag_of(self, descriptors: Descriptors) -> BagOfWords:
-        """The words of an image with the descriptors (N, 32)."""
-        return self._vocabulary.bag_of(descriptors)
 
     def add(self, place: int, bag: BagOfWords) -> None:
         """Remember a place; numbers must rise.

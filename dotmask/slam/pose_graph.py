@@ -7,11 +7,15 @@ RA-L 2020) starts from all loops and lets go, step by step, of those that the ot
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from dotmask.records import FloatArray
+
+if TYPE_CHECKING:
+    import gtsam
 
 ANCHOR_SIGMA = 1e-6
 """Standard deviation of the first pose, radians and metres: it ties the map to the world."""
@@ -61,26 +65,40 @@ def optimise(
         loops: edges of which some may be wrong.
         rejection_probability: a right loop would be as far off as a rejected one with less than this probability.
     """
+    before = np.array(T_world_node, np.float64).reshape(-1, 4, 4)
     if not loops:
-        return OptimisedGraph(
-            T_world_node=np.array(T_world_node, np.float64).reshape(-1, 4, 4), is_accepted=np.zeros(0, np.bool_)
-        )
+        return OptimisedGraph(T_world_node=before, is_accepted=np.zeros(0, np.bool_))
     import gtsam  # slow to load, and not needed without a loop
 
-    graph, start = gtsam.NonlinearFactorGraph(), gtsam.Values()
-    anchor = gtsam.noiseModel.Isotropic.Sigma(6, ANCHOR_SIGMA)
-    graph.add(gtsam.PriorFactorPose3(0, gtsam.Pose3(T_world_node[0]), anchor))
-    for edge in (*odometry, *loops):
-        noise = gtsam.noiseModel.Gaussian.Covariance(edge.covariance)
-        graph.add(gtsam.BetweenFactorPose3(edge.a, edge.b, gtsam.Pose3(edge.T_a_b), noise))
-    for node, T in enumerate(T_world_node):
+    start = gtsam.Values()
+    for node, T in enumerate(before):
         start.insert(node, gtsam.Pose3(T))
     known = 1 + len(odometry)
     parameters = gtsam.GncLMParams(gtsam.LevenbergMarquardtParams())
     parameters.setLossType(gtsam.GncLossType.TLS)
     parameters.setKnownInliers(list(range(known)))
-    optimiser = gtsam.GncLMOptimizer(graph, start, parameters)
-    optimiser.setInlierCostThresholdsAtProbability(1 - rejection_probability)
-    found = optimiser.optimize()
-    poses = np.array([found.atPose3(node).matrix() for node in range(len(T_world_node))])
-    return OptimisedGraph(T_world_node=poses, is_accepted=np.asarray(optimiser.getWeights())[known:] > INLIER_WEIGHT)
+    graduated = gtsam.GncLMOptimizer(_graph(before[0], (*odometry, *loops)), start, parameters)
+    graduated.setInlierCostThresholdsAtProbability(1 - rejection_probability)
+    graduated.optimize()
+    is_accepted = np.asarray(graduated.getWeights())[known:] > INLIER_WEIGHT
+    if not is_accepted.any():
+        return OptimisedGraph(T_world_node=before, is_accepted=is_accepted)
+    # Once more with the accepted loops alone, so that the others leave nothing behind.
+    accepted = [loop for loop, good in zip(loops, is_accepted, strict=True) if good]
+    found = gtsam.LevenbergMarquardtOptimizer(_graph(before[0], (*odometry, *accepted)), start).optimize()
+    return OptimisedGraph(
+        T_world_node=np.array([found.atPose3(node).matrix() for node in range(len(before))]), is_accepted=is_accepted
+    )
+
+
+def _graph(T_world_first: FloatArray, edges: Sequence[Edge]) -> "gtsam.NonlinearFactorGraph":
+    """The first pose, then the edges in their order."""
+    import gtsam
+
+    graph = gtsam.NonlinearFactorGraph()
+    anchor = gtsam.noiseModel.Isotropic.Sigma(6, ANCHOR_SIGMA)
+    graph.add(gtsam.PriorFactorPose3(0, gtsam.Pose3(T_world_first), anchor))
+    for edge in edges:
+        noise = gtsam.noiseModel.Gaussian.Covariance(edge.covariance)
+        graph.add(gtsam.BetweenFactorPose3(edge.a, edge.b, gtsam.Pose3(edge.T_a_b), noise))
+    return graph

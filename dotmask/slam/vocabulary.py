@@ -73,22 +73,22 @@ class Vocabulary:
 
     def words_of(self, descriptors: Descriptors) -> WordIds:
         """The word of each descriptor (N, 32): (N,). Among centres of one distance, the first."""
-        return self.nodes_of(descriptors, len(self.levels))
-
-    def nodes_of(self, descriptors: Descriptors, depth: int) -> WordIds:
-        """The node of each descriptor (N, 32) after `depth` levels, at least 1: (N,)."""
         branches = len(self.levels[0])
         given = np.ascontiguousarray(descriptors).view(np.uint64)
         node = np.zeros(len(given), np.intp)
-        for nodes in self.levels[:depth]:
+        for nodes in self.levels:
             centres = nodes.view(np.uint64).reshape(-1, branches, 4)[node]
             differing = np.bitwise_count(centres ^ given[:, None, :]).sum(axis=2, dtype=np.int64)
             node = node * branches + differing.argmin(axis=1)
         return node
 
-    def bag_of(self, descriptors: Descriptors) -> BagOfWords:
-        """The words of an image with the descriptors (N, 32)."""
-        words, counts = np.unique(self.words_of(descriptors), return_counts=True)
+    def parents_of(self, words: WordIds) -> WordIds:
+        """The node above each of the words (N,) in the tree: words of one node are alike."""
+        return words // len(self.levels[0])
+
+    def bag_of(self, words_seen: WordIds) -> BagOfWords:
+        """The bag of an image whose descriptors have the words (N,)."""
+        words, counts = np.unique(words_seen, return_counts=True)
         weights = counts * self.idf[words]
         telling = weights > 0
         words, weights = words[telling], weights[telling]

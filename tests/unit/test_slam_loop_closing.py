@@ -17,8 +17,7 @@ from dotmask.slam.twists import exp
 from dotmask.slam.vocabulary import Vocabulary
 
 CAMERA = Intrinsics(width=64, height=48, fx=50.0, fy=50.0, cx=31.5, cy=23.5)
-CENTRES = np.random.default_rng(0).integers(0, 256, (64, 32), dtype=np.uint8)
-VOCABULARY = Vocabulary(levels=(CENTRES,), idf=np.ones(64, np.float32))
+VOCABULARY = Vocabulary(levels=(np.zeros((64, 32), np.uint8),), idf=np.ones(64, np.float32))
 SETTINGS = LoopSettings(recent_keyframes=3)
 DEPTH = CoarseDepth.of(np.ones((48, 64), np.float32), CAMERA)
 
@@ -39,7 +38,8 @@ def keyframe(number: int, T_world_camera: FloatArray, place: int) -> Keyframe:
         T_world_camera=T_world_camera,
         pixels=np.zeros((8, 2), np.float32),
         p_camera=np.ones((8, 3), np.float32),
-        descriptors=CENTRES[words],
+        descriptors=np.zeros((8, 32), np.uint8),
+        words=words,
         depth=DEPTH,
     )
 

@@ -80,7 +80,7 @@ class Place:
         pixels = pixels[order] + self.rng.normal(0, 0.5, (len(order), 2))
         z = camera[order, 2]
         z = z + self.rng.normal(0, 0.002 + 0.0015 * z**2)
-        wrong_bits = np.packbits(self.rng.random((len(order), 256)) < 0.02, axis=1)
+        descriptors = self.descriptors[order] ^ np.packbits(self.rng.random((len(order), 256)) < 0.02, axis=1)
         return Keyframe(
             number=number,
             frame_index=number,
@@ -88,7 +88,8 @@ class Place:
             T_world_camera=T_world_camera,
             pixels=pixels.astype(np.float32),
             p_camera=back_project(pixels, z, CAMERA).astype(np.float32),
-            descriptors=self.descriptors[order] ^ wrong_bits,
+            descriptors=descriptors,
+            words=load_vocabulary().words_of(descriptors),
             depth=self.depth(T_world_camera),
         )
 

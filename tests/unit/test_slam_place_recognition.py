@@ -4,15 +4,9 @@ import numpy as np
 import pytest
 
 from dotmask.slam.place_recognition import PlaceRecognition
-from dotmask.slam.vocabulary import BagOfWords, Vocabulary
+from dotmask.slam.vocabulary import BagOfWords
 
 WORDS = 64
-
-
-@pytest.fixture(scope="module")
-def vocabulary() -> Vocabulary:
-    centres = np.random.default_rng(0).integers(0, 256, (WORDS, 32), dtype=np.uint8)
-    return Vocabulary(levels=(centres,), idf=np.ones(WORDS, np.float32))
 
 
 def bags(count: int, seed: int) -> list[BagOfWords]:
@@ -25,48 +19,48 @@ def bags(count: int, seed: int) -> list[BagOfWords]:
     return made
 
 
-def known(vocabulary: Vocabulary, images: list[BagOfWords]) -> PlaceRecognition:
-    places = PlaceRecognition(vocabulary)
+def known(images: list[BagOfWords]) -> PlaceRecognition:
+    places = PlaceRecognition(WORDS)
     for number, bag in enumerate(images):
         places.add(number, bag)
     return places
 
 
-def test_similarities_equal_those_of_pairs_of_bags(vocabulary):
+def test_similarities_equal_those_of_pairs_of_bags():
     images = bags(40, 1)  # more than the first capacity
-    found = known(vocabulary, images).similarities(images[3])
+    found = known(images).similarities(images[3])
     np.testing.assert_allclose(found, [images[3].similarity(other) for other in images], atol=1e-6)
     assert found[3] == pytest.approx(1.0)
 
 
-def test_the_same_place_comes_first(vocabulary):
+def test_the_same_place_comes_first():
     images = bags(30, 2)
-    places = known(vocabulary, images)
+    places = known(images)
     for number in (0, 13, 29):
         best, *_ = places.similar(images[number], count=3)
         assert best.place == number
         assert best.similarity == pytest.approx(1.0)
 
 
-def test_recent_places_and_weak_ones_are_left_out(vocabulary):
+def test_recent_places_and_weak_ones_are_left_out():
     images = bags(20, 3)
-    places = known(vocabulary, [*images, images[4]])
+    places = known([*images, images[4]])
     assert [found.place for found in places.similar(images[4], count=5, least=0.9)] == [4, 20]
     assert [found.place for found in places.similar(images[4], count=5, least=0.9, before=20)] == [4]
     assert places.similar(images[4], count=5, least=0.9, before=4) == ()
     assert len(places.similar(images[4], count=2)) == 2
 
 
-def test_neighbours_that_saw_the_same_are_one_answer(vocabulary):
+def test_neighbours_that_saw_the_same_are_one_answer():
     (place, *others) = bags(8, 4)
     mixed = [BagOfWords(words=place.words, weights=place.weights * share) for share in (0.8, 0.9, 1.0, 0.7)]
-    places = known(vocabulary, [*others[:3], *mixed, *others[3:]])
+    places = known([*others[:3], *mixed, *others[3:]])
     assert [found.place for found in places.similar(place, count=4, least=0.6)] == [5]
 
 
-def test_a_forgotten_place_is_not_found_and_the_others_stay(vocabulary):
+def test_a_forgotten_place_is_not_found_and_the_others_stay():
     images = bags(20, 5)
-    places = known(vocabulary, images)
+    places = known(images)
     places.forget(7)
     assert len(places) == 19
     assert places.similar(images[7], count=1, least=0.9) == ()
@@ -76,15 +70,15 @@ def test_a_forgotten_place_is_not_found_and_the_others_stay(vocabulary):
     assert places.similar(images[7], count=1)[0].place == 20
 
 
-def test_numbers_must_rise(vocabulary):
+def test_numbers_must_rise():
     (bag,) = bags(1, 6)
-    places = known(vocabulary, [bag, bag])
+    places = known([bag, bag])
     with pytest.raises(ValueError, match="place 1 does not come after 1"):
         places.add(1, bag)
 
 
-def test_nothing_is_similar_to_nothing(vocabulary):
+def test_nothing_is_similar_to_nothing():
     (bag,) = bags(1, 7)
     empty = BagOfWords(words=np.zeros(0, np.intp), weights=np.zeros(0, np.float32))
-    assert PlaceRecognition(vocabulary).similar(bag, count=3) == ()
-    assert known(vocabulary, [bag, empty]).similar(empty, count=3) == ()
+    assert PlaceRecognition(WORDS).similar(bag, count=3) == ()
+    assert known([bag, empty]).similar(empty, count=3) == ()

@@ -85,7 +85,14 @@ def test_a_false_loop_is_rejected_and_leaves_no_trace(wrong):
     without = optimise(poses, odometry, good, REJECTION)
     found = optimise(poses, odometry, [good[0], loop(TRUTH, 30, 10, np.array(wrong)), good[1]], REJECTION)
     assert found.is_accepted.tolist() == [True, False, True]
-    np.testing.assert_allclose(found.T_world_node, without.T_world_node, atol=1e-4)
+    np.testing.assert_array_equal(found.T_world_node, without.T_world_node)
+
+
+def test_odometry_stays_when_every_loop_is_rejected():
+    poses, odometry = drifted(TRUTH, DRIFT)
+    found = optimise(poses, odometry, [loop(TRUTH, 40, 0, np.array([0, 0, 0, 1.0, 0, 0]))], REJECTION)
+    assert found.is_accepted.tolist() == [False]
+    np.testing.assert_array_equal(found.T_world_node, poses)
 
 
 def test_false_loops_that_agree_with_each_other_are_outnumbered_by_odometry():

@@ -38,27 +38,27 @@ def test_words_equal_a_walk_down_the_tree():
     wanted = [plain_word(vocabulary, descriptor) for descriptor in descriptors]
     assert len(set(wanted)) > 5
     assert vocabulary.words_of(descriptors).tolist() == wanted
-    assert vocabulary.nodes_of(descriptors, 1).tolist() == [word // 3 for word in wanted]
+    top = Vocabulary(levels=vocabulary.levels[:1], idf=np.ones(3, np.float32))
+    assert vocabulary.parents_of(np.array(wanted)).tolist() == top.words_of(descriptors).tolist()
 
 
 def test_bag_weighs_by_frequency_and_rarity():
     centres = np.zeros((3, 32), np.uint8)
     centres[1], centres[2] = 0x0F, 0xFF
     vocabulary = Vocabulary(levels=(centres,), idf=np.array([1.0, 3.0, 0.0], np.float32))
-    bag = vocabulary.bag_of(centres[[0, 0, 0, 1, 2, 2]])
+    bag = vocabulary.bag_of(vocabulary.words_of(centres[[0, 0, 0, 1, 2, 2]]))
     # 3 x 1 against 1 x 3; the word that every image shows tells nothing and is left out.
     assert bag.words.tolist() == [0, 1]
     np.testing.assert_allclose(bag.weights, [0.5, 0.5])
 
 
 def test_similarity_is_the_weight_in_common():
-    centres = np.stack([np.full(32, value, np.uint8) for value in (0x00, 0x0F, 0xF0, 0xFF)])
-    vocabulary = Vocabulary(levels=(centres,), idf=np.ones(4, np.float32))
-    a, b = vocabulary.bag_of(centres[[0, 0, 1, 2]]), vocabulary.bag_of(centres[[0, 2, 3, 3]])
+    vocabulary = Vocabulary(levels=(np.zeros((4, 32), np.uint8),), idf=np.ones(4, np.float32))
+    a, b = (vocabulary.bag_of(np.array(words)) for words in ([0, 0, 1, 2], [0, 2, 3, 3]))
     # Words 0 and 2 of both: min(1/2, 1/4) + min(1/4, 1/4).
     assert a.similarity(b) == pytest.approx(0.5)
     assert a.similarity(a) == pytest.approx(1.0)
-    assert vocabulary.bag_of(np.zeros((0, 32), np.uint8)).similarity(a) == 0
+    assert vocabulary.bag_of(np.zeros(0, np.intp)).similarity(a) == 0
 
 
 def test_the_shipped_words_tell_noise_from_another_corner():
