@@ -18,7 +18,7 @@ from dotmask.records import (
     check_finite,
     checked,
 )
-from dotmask.slam.features import FeatureExtractor, Features, GreyImage
+from dotmask.slam.features import FeatureExtractor, Features
 from dotmask.slam.keyframes import Keyframe, KeyframeStore
 from dotmask.slam.loop_closing import LoopClosing
 from dotmask.slam.odometry import Odometry
@@ -33,7 +33,6 @@ _DEFAULT_LOOP_SETTINGS = LoopSettings()
 class _Seen:
     """What odometry found in the last frame; mapping goes on from it."""
 
-    grey: GreyImage
     features: Features
     T_world_camera: FloatArray
 
@@ -85,7 +84,7 @@ class EmbeddedSlam:
 
     @property
     def keyframes(self) -> tuple[Keyframe, ...]:
-        """The keyframes in the order of time, at most `settings.max_keyframes` (about 50 kB each)."""
+        """The keyframes in the order of time, at most `settings.max_keyframes` (about 80 kB each)."""
         return self._store.keyframes
 
     def track(self, frame: RgbdFrame, masked: MaskedDepth) -> PoseEstimate:
@@ -111,7 +110,7 @@ class EmbeddedSlam:
         self._seen = None
         if result is None:
             return PoseEstimate(timestamp_s=frame.timestamp_s, T_world_camera=None, status=SlamStatus.LOST, inliers=0)
-        self._seen = _Seen(grey=grey, features=features, T_world_camera=result.T_world_camera)
+        self._seen = _Seen(features=features, T_world_camera=result.T_world_camera)
         self._poses.append(_Pose(frame.index, frame.timestamp_s, result.T_world_camera))
         return PoseEstimate(
             timestamp_s=frame.timestamp_s,
@@ -128,9 +127,7 @@ class EmbeddedSlam:
         seen = self._seen
         if seen is None or not self._store.is_due(seen.T_world_camera):
             return
-        # Where both depths are masked alike, odometry has found the corners already.
-        same = np.array_equal(masked.mdi_m, masked.mo_mdi_m)
-        features = seen.features if same else self._extractor.extract(seen.grey, masked.mdi_m)
+        features = self._extractor.within(seen.features, masked.mdi_m)
         words = self._vocabulary.words_of(features.descriptors)
         dropped = self._store.add(frame.index, frame.timestamp_s, seen.T_world_camera, features, words, masked.mdi_m)
         self._loops.add(self._store.keyframes[-1], dropped)
