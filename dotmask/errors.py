@@ -19,3 +19,7 @@ class SequenceFolderError(DotmaskError):
 
 class SlamError(DotmaskError):
     """A SLAM back end is not installed, was given a wrong parameter, or has failed."""
+
+
+class VocabularyError(DotmaskError):
+    """The visual vocabulary of place recognition is missing or damaged."""

@@ -1,6 +1,7 @@
-"""The embedded SLAM back end: RGB-D odometry and keyframes on OpenCV and NumPy."""
+"""The embedded SLAM back end: RGB-D odometry, keyframes, loop closure and a pose graph."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -17,36 +18,48 @@ from dotmask.records import (
     check_finite,
     checked,
 )
-from dotmask.slam.features import FeatureExtractor, Features, GreyImage
+from dotmask.slam.features import FeatureExtractor, Features
 from dotmask.slam.keyframes import Keyframe, KeyframeStore
+from dotmask.slam.loop_closing import LoopClosing
 from dotmask.slam.odometry import Odometry
-from dotmask.slam.settings import OdometrySettings
+from dotmask.slam.settings import LoopSettings, OdometrySettings
+from dotmask.slam.vocabulary import load_vocabulary
 
 _DEFAULT_SETTINGS = OdometrySettings()
+_DEFAULT_LOOP_SETTINGS = LoopSettings()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Seen:
     """What odometry found in the last frame; mapping goes on from it."""
 
-    grey: GreyImage
     features: Features
+    T_world_camera: FloatArray
+
+
+class _Pose(NamedTuple):
+    """What odometry said of one frame."""
+
+    frame_index: int
+    timestamp_s: float
     T_world_camera: FloatArray
 
 
 class EmbeddedSlam:
     """A `SlamBackend` that needs no other program and gives the same poses, bit for bit, in every run.
 
-    Odometry uses corners with depth in MO-MDI. Keyframes hold corners with depth in MDI; they are what loop closure
-    and the pose graph work on. The poses that `track` returns are those of odometry.
+    Odometry uses corners with depth in MO-MDI. Keyframes hold corners with depth in MDI; loops are found among them.
+    The poses that `track` returns are those of odometry, and no loop makes them jump; `finish` closes the loops.
 
     Args:
         intrinsics: of all frames.
         initial_T_world_camera: (4, 4) pose of the camera at the first frame; it ties the map to the world.
-        settings: parameters.
+        settings: parameters of odometry and of keyframes.
+        loop_settings: parameters of loop closure.
 
     Raises:
         ValueError: the initial pose is not a finite 4x4 matrix.
+        VocabularyError: the visual vocabulary that comes with the package is missing or damaged.
     """
 
     def __init__(
@@ -54,6 +67,7 @@ class EmbeddedSlam:
         intrinsics: Intrinsics,
         initial_T_world_camera: FloatArray,
         settings: OdometrySettings = _DEFAULT_SETTINGS,
+        loop_settings: LoopSettings = _DEFAULT_LOOP_SETTINGS,
     ) -> None:
         start = checked(initial_T_world_camera, "initial_T_world_camera", (4, 4), np.float64)
         check_finite(start, "initial_T_world_camera")
@@ -61,14 +75,16 @@ class EmbeddedSlam:
         self._extractor = FeatureExtractor(intrinsics, settings)
         self._odometry = Odometry(intrinsics, start, settings)
         self._store = KeyframeStore(intrinsics, settings)
+        self._vocabulary = load_vocabulary()
+        self._loops = LoopClosing(intrinsics, self._vocabulary, settings, loop_settings)
         self._started, self._is_lost = False, False
         self._last_time_s: float | None = None
         self._seen: _Seen | None = None
-        self._poses: list[tuple[float, FloatArray]] = []
+        self._poses: list[_Pose] = []
 
     @property
     def keyframes(self) -> tuple[Keyframe, ...]:
-        """The keyframes in the order of time, at most `settings.max_keyframes` (about 50 kB each)."""
+        """The keyframes in the order of time, at most `settings.max_keyframes` (about 80 kB each)."""
         return self._store.keyframes
 
     def track(self, frame: RgbdFrame, masked: MaskedDepth) -> PoseEstimate:
@@ -96,8 +112,8 @@ class EmbeddedSlam:
         self._seen, self._is_lost = None, self._started and result is None
         if result is None:
             return PoseEstimate(timestamp_s=frame.timestamp_s, T_world_camera=None, status=SlamStatus.LOST, inliers=0)
-        self._seen = _Seen(grey=grey, features=features, T_world_camera=result.T_world_camera)
-        self._poses.append((frame.timestamp_s, result.T_world_camera))
+        self._seen = _Seen(features=features, T_world_camera=result.T_world_camera)
+        self._poses.append(_Pose(frame.index, frame.timestamp_s, result.T_world_camera))
         return PoseEstimate(
             timestamp_s=frame.timestamp_s,
             T_world_camera=result.T_world_camera,
@@ -107,23 +123,29 @@ class EmbeddedSlam:
         )
 
     def update_map(self, frame: RgbdFrame, masked: MaskedDepth) -> None:
-        """Keep the frame as a keyframe when the camera has moved enough; nothing happens while lost."""
+        """Keep the frame as a keyframe when the camera has moved enough, and look for a loop from it.
+
+        Nothing happens while lost.
+        """
         seen = self._seen
         if seen is None or not self._store.is_due(seen.T_world_camera):
             return
-        # Where both depths are masked alike, odometry has found the corners already.
-        same = np.array_equal(masked.mdi_m, masked.mo_mdi_m)
-        features = seen.features if same else self._extractor.extract(seen.grey, masked.mdi_m)
-        self._store.add(frame.index, frame.timestamp_s, seen.T_world_camera, features)
+        features = self._extractor.within(seen.features, masked.mdi_m)
+        words = self._vocabulary.words_of(features.descriptors)
+        dropped = self._store.add(frame.index, frame.timestamp_s, seen.T_world_camera, features, words, masked.mdi_m)
+        self._loops.add(self._store.keyframes[-1], dropped)
 
     def finish(self) -> SlamResult:
-        """The poses of all frames that were not lost."""
+        """The poses of all frames that were not lost, with the loops closed: each moves with the keyframe before it."""
+        closed, poses = self._loops.close(), self._poses
         return SlamResult(
             trajectory=Trajectory(
-                timestamps_s=np.array([t for t, _ in self._poses], np.float64),
-                T_world_camera=np.array([p for _, p in self._poses], np.float64).reshape(-1, 4, 4),
+                timestamps_s=np.array([pose.timestamp_s for pose in poses], np.float64),
+                T_world_camera=closed.corrected(
+                    [pose.frame_index for pose in poses], [pose.T_world_camera for pose in poses]
+                ),
             ),
-            loops=(),
+            loops=closed.loops,
         )
 
     def _check(self, frame: RgbdFrame, masked: MaskedDepth) -> None:

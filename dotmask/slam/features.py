@@ -84,6 +84,11 @@ class FeatureExtractor:
             on_one_surface
         )
 
+    def within(self, features: Features, depth_m: DepthImage) -> Features:
+        """Those of `features` that have depth and stand on one surface in `depth_m` (H, W; 0 = none or masked) too."""
+        depth, on_one_surface = self._depth_at(features.pixels, depth_m)
+        return Features(pixels=features.pixels, descriptors=features.descriptors, depth_m=depth).select(on_one_surface)
+
     def _depth_at(self, pixels: FloatArray, depth_m: DepthImage) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
         """Depth at each corner (N,), and whether all around it is valid and of one surface."""
         s = self._settings

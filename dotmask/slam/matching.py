@@ -14,6 +14,9 @@ from dotmask.slam.features import Descriptors, Features
 Matches = npt.NDArray[np.intp]
 """(M, 2): index of the map point, index of the corner."""
 
+Groups = npt.NDArray[np.intp]
+"""(N,) which group each descriptor belongs to."""
+
 _FAR = 1 << 16
 
 
@@ -43,14 +46,9 @@ def match_near(
     other_words = np.ascontiguousarray(features.descriptors).view(np.uint64)
     hamming = np.bitwise_count(words[point] ^ other_words[corner]).sum(axis=1, dtype=np.int64)
 
-    # One sortable key per candidate: distance first, then the corner. The best two per point follow by minima.
-    starts = np.flatnonzero(np.r_[True, point[1:] != point[:-1]])
-    lengths = np.diff(np.r_[starts, len(point)])
-    key = (hamming << 32) | corner
-    best_key = np.minimum.reduceat(key, starts)
-    others = np.where(key == np.repeat(best_key, lengths), _FAR << 32, key)
-    second = np.minimum.reduceat(others, starts) >> 32
-    return _one_to_one(point[starts], best_key & 0xFFFFFFFF, best_key >> 32, second, max_hamming, ratio)
+    # One sortable key per candidate: distance first, then the corner.
+    best, second = _best_two(point, (hamming << 32) | corner, len(descriptors))
+    return _one_to_one(np.arange(len(best)), best & 0xFFFFFFFF, best >> 32, second >> 32, max_hamming, ratio)
 
 
 def match_anywhere(descriptors: Descriptors, features: Features, *, max_hamming: int, ratio: float) -> Matches:
@@ -61,6 +59,62 @@ def match_anywhere(descriptors: Descriptors, features: Features, *, max_hamming:
     table = np.array([(a.queryIdx, a.trainIdx, a.distance, b.distance) for a, b in pairs]).astype(np.int64)
     point, corner, hamming, second = table.T
     return _one_to_one(point, corner, hamming, second, max_hamming, ratio)
+
+
+def match_within_groups(
+    descriptors: Descriptors,
+    groups: Groups,
+    other_descriptors: Descriptors,
+    other_groups: Groups,
+    *,
+    max_hamming: int,
+    ratio: float,
+) -> Matches:
+    """Pairs (M, 2) of descriptors that are each other's nearest among those of the same group.
+
+    Args:
+        descriptors: (N, 32).
+        groups: (N,) the group of each, from 0; alike descriptors should have the same one.
+        other_descriptors: (K, 32).
+        other_groups: (K,).
+        max_hamming: most differing bits.
+        ratio: seen from either side, the nearest must be nearer than this times the second nearest of the group; at
+            most 1.
+    """
+    order = np.argsort(other_groups, kind="stable")
+    ends = np.searchsorted(other_groups[order], np.arange(max(groups.max(initial=0), other_groups.max(initial=0)) + 2))
+    counts = (ends[1:] - ends[:-1])[groups]
+    one = np.repeat(np.arange(len(groups)), counts)
+    if len(one) == 0:
+        return np.zeros((0, 2), np.intp)
+    other = order[np.arange(len(one)) - np.repeat(np.cumsum(counts) - counts - ends[groups], counts)]
+    words = np.ascontiguousarray(descriptors).view(np.uint64)
+    other_words = np.ascontiguousarray(other_descriptors).view(np.uint64)
+    hamming = np.bitwise_count(words[one] ^ other_words[other]).sum(axis=1, dtype=np.int64)
+
+    best, second = _best_two(one, (hamming << 32) | other, len(groups))
+    back = np.argsort(other, kind="stable")
+    _, second_back = _best_two(other[back], ((hamming << 32) | one)[back], len(other_groups))
+    distance, nearest = best >> 32, best & 0xFFFFFFFF
+    candidates = np.flatnonzero((distance <= max_hamming) & (distance < ratio * (second >> 32)))
+    to = nearest[candidates]
+    # Nearer than the second best of the other side: then it is the other side's best.
+    mutual = distance[candidates] < ratio * (second_back[to] >> 32)
+    return np.stack([candidates[mutual], to[mutual]], axis=1).astype(np.intp)
+
+
+def _best_two(
+    owner: npt.NDArray[np.int64], keys: npt.NDArray[np.int64], owners: int
+) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """The two least keys of each owner (their runs in rising order): two arrays (owners,), far where there is none."""
+    starts = np.flatnonzero(np.r_[True, owner[1:] != owner[:-1]])
+    lengths = np.diff(np.r_[starts, len(owner)])
+    best, second = np.full(owners, _FAR << 32), np.full(owners, _FAR << 32)
+    least = np.minimum.reduceat(keys, starts)
+    best[owner[starts]] = least
+    others = np.where(keys == np.repeat(least, lengths), _FAR << 32, keys)
+    second[owner[starts]] = np.minimum.reduceat(others, starts)
+    return best, second
 
 
 def _one_to_one(

@@ -79,3 +79,77 @@ class OdometrySettings:
             raise ValueError("odometry settings: min_inliers below 6 cannot confirm a pose")
         if self.max_keyframes < 3:
             raise ValueError("odometry settings: max_keyframes must be at least 3")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoopSettings:
+    """Parameters of loop closure and the pose graph, calibrated on synthetic sequences of 640 x 480 pixels.
+
+    Lengths in pixels hold at a width of 640 and scale with the image width.
+
+    Attributes:
+        recent_keyframes: the last so many keyframes close no loop: odometry sees the same points itself.
+        candidates: at most this many similar places are verified per keyframe.
+        relative_similarity: a place must be this similar to a keyframe, in terms of the keyframe before it.
+        proximity_distance_m: without a loop by looks, keyframes are tried whose odometry poses are this near ...
+        proximity_angle_rad: ... and look in directions that differ by less than this.
+        max_hamming: most differing bits (of 256) of two descriptors that match.
+        ratio: a match must be this much nearer than the second best (Lowe 2004).
+        min_match_share: least share of the matches that must agree with one relative pose; when somebody in view has
+            moved in between, either those on the person or all others do not.
+        guided_radius_px: search window of the second matching, around where the first pose expects each corner.
+        min_inliers: least matches that must agree with the relative pose in each direction.
+        min_cells: least number of the image's `CELLS` that hold inliers, in each image.
+        max_translation_sigma_m: largest standard deviation of the translation along any axis.
+        max_disagreement_m: most by which the poses solved in the two directions may differ ...
+        max_disagreement_rad: ... and in rotation.
+        depth_tolerance: share of the depth by which a surface may be off.
+        min_overlap: least share of one image's surfaces that must be in view of the other.
+        min_agreeing: least share of the surfaces in view that must lie on each other.
+        max_violating: most of them that may lie where the other image has looked through.
+        pixel_sigma_px: standard deviation of a corner, for the covariance of a loop; wide enough for what the errors of
+            many corners have in common.
+        odometry_floor_m: standard deviation of odometry from one keyframe to the next: this ...
+        odometry_per_m: ... and this share of the way (translation) ...
+        odometry_floor_rad: ... and for rotation this ...
+        odometry_per_rad: ... and this share of the turn.
+        rejection_probability: a loop is rejected when a right one would be as far from the optimised poses with less
+            than this probability.
+    """
+
+    recent_keyframes: int = 10
+    candidates: int = 1
+    relative_similarity: float = 0.75
+    proximity_distance_m: float = 0.5
+    proximity_angle_rad: float = 0.5
+    max_hamming: int = 64
+    ratio: float = 0.85
+    min_match_share: float = 0.7
+    guided_radius_px: float = 8.0
+    min_inliers: int = 40
+    min_cells: int = 8
+    max_translation_sigma_m: float = 0.005
+    max_disagreement_m: float = 0.02
+    max_disagreement_rad: float = 0.01
+    depth_tolerance: float = 0.02
+    min_overlap: float = 0.3
+    min_agreeing: float = 0.85
+    max_violating: float = 0.01
+    pixel_sigma_px: float = 1.0
+    odometry_floor_m: float = 0.0005
+    odometry_per_m: float = 0.005
+    odometry_floor_rad: float = 0.0002
+    odometry_per_rad: float = 0.002
+    rejection_probability: float = 1e-4
+
+    def __post_init__(self) -> None:
+        """Refuse values that cannot work."""
+        if self.recent_keyframes < 1:
+            raise ValueError("loop settings: recent_keyframes must be at least 1")
+        if self.min_inliers < 6:
+            raise ValueError("loop settings: min_inliers below 6 cannot confirm a loop")
+        for name in ("odometry_floor_m", "odometry_floor_rad", "pixel_sigma_px"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"loop settings: {name} must be positive")
+        if not 0 < self.rejection_probability < 1:
+            raise ValueError("loop settings: rejection_probability must be between 0 and 1")

@@ -27,6 +27,15 @@ def test_masking_saves_odometry(walking_xyz: Report) -> None:
     assert methods["dotmask"].tracked_frames == 864
 
 
+def test_loops_are_found_where_people_are_masked(walking_xyz: Report) -> None:
+    dotmask, unmasked = walking_xyz.methods["dotmask"], walking_xyz.methods["unmasked"]
+    assert dotmask.loops.count >= 10
+    assert dotmask.loops.count >= 3 * unmasked.loops.count
+    assert dotmask.loops.trans_error_m < 0.005
+    assert dotmask.loops.false_count == unmasked.loops.false_count == 0
+    assert dotmask.ate_optimised_rmse_m < 0.012
+
+
 def test_the_classification_finds_what_moves(walking_xyz: Report) -> None:
     moc = walking_xyz.methods["dotmask"].moc
     assert moc.recall >= 0.95

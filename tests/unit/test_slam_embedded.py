@@ -12,7 +12,7 @@ from dotmask.records import Intrinsics, MaskedDepth, PoseEstimate, RgbdFrame, Sl
 from dotmask.slam.embedded import EmbeddedSlam
 from dotmask.slam.features import FeatureExtractor
 from dotmask.slam.odometry import Odometry
-from dotmask.slam.settings import OdometrySettings
+from dotmask.slam.settings import LoopSettings, OdometrySettings
 
 CAMERA = Intrinsics(width=320, height=240, fx=262.0, fy=275.0, cx=158.0, cy=121.5)
 START = np.eye(4)
@@ -268,3 +268,84 @@ def test_refuses_what_does_not_fit(frames):
         other.track(frames[0], unmasked(frames[0]))
     with pytest.raises(ValueError, match="initial_T_world_camera"):
         EmbeddedSlam(CAMERA, np.eye(3))
+
+
+def there_and_back() -> list[RgbdFrame]:
+    """The frames, then the same places again in reverse."""
+    numbers = [*range(FRAMES), *reversed(range(FRAMES - 1))]
+    return [replace(render(k)[0], index=index, timestamp_s=10 + index / 30) for index, k in enumerate(numbers)]
+
+
+OFTEN = OdometrySettings(keyframe_distance_m=0.02, keyframe_angle_rad=9.0)
+"""A keyframe in every frame, of 26 mm of motion each."""
+
+
+def test_a_place_seen_again_is_a_loop():
+    frames = there_and_back()
+    slam = EmbeddedSlam(CAMERA, START, OFTEN, LoopSettings(recent_keyframes=4))
+    estimates = follow(slam, frames)
+    result = slam.finish()
+    assert len(result.loops) >= 4
+    for loop in result.loops:
+        later, earlier = min(loop.from_index, 10 - loop.from_index), min(loop.to_index, 10 - loop.to_index)
+        T_from_to = inverse(pose_in_scene(later)) @ pose_in_scene(earlier)
+        assert np.linalg.norm((inverse(T_from_to) @ loop.T_from_to)[:3, 3]) < 0.004
+    np.testing.assert_allclose(result.trajectory.timestamps_s, [frame.timestamp_s for frame in frames])
+    for k, T in enumerate(result.trajectory.T_world_camera):
+        assert np.linalg.norm((inverse(START @ pose_in_scene(min(k, 10 - k))) @ T)[:3, 3]) < 0.003
+    # Odometry's poses were given before any loop was closed, and stay what they were.
+    assert not np.array_equal(result.trajectory.T_world_camera[-1], estimates[-1].T_world_camera)
+
+
+def test_without_a_loop_the_answer_is_odometrys(frames, blank):
+    slam = EmbeddedSlam(CAMERA, START)
+    estimates = follow(slam, [*frames[:2], blank, *frames[3:]])
+    result = slam.finish()
+    assert result.loops == ()
+    found = [estimate for estimate in estimates if estimate.T_world_camera is not None]
+    assert len(found) == FRAMES - 1
+    np.testing.assert_array_equal(result.trajectory.timestamps_s, [estimate.timestamp_s for estimate in found])
+    np.testing.assert_allclose(
+        result.trajectory.T_world_camera, [estimate.T_world_camera for estimate in found], atol=1e-12
+    )
+
+
+def test_a_run_that_never_started_has_an_empty_answer(blank):
+    slam = EmbeddedSlam(CAMERA, START)
+    follow(slam, [blank])
+    result = slam.finish()
+    assert len(result.trajectory) == 0
+    assert result.loops == ()
+
+
+def test_loops_outlive_the_keyframes_that_are_dropped():
+    frames = there_and_back()
+    loops = []
+    for bound in (1000, 6):
+        slam = EmbeddedSlam(CAMERA, START, replace(OFTEN, max_keyframes=bound), LoopSettings(recent_keyframes=4))
+        follow(slam, frames)
+        result = slam.finish()
+        assert len(slam.keyframes) == min(bound, len(frames))
+        loops.append(result.loops)
+        for k, T in enumerate(result.trajectory.T_world_camera):
+            assert np.linalg.norm((inverse(START @ pose_in_scene(min(k, 10 - k))) @ T)[:3, 3]) < 0.003
+    kept = {keyframe.frame_index for keyframe in slam.keyframes}
+    assert any(loop.to_index not in kept or loop.from_index not in kept for loop in loops[1])
+
+
+def test_the_closed_loops_are_the_same_bits_for_any_threads():
+    frames = there_and_back()
+
+    def answer(threads: int) -> bytes:
+        before = cv2.getNumThreads()
+        try:
+            cv2.setNumThreads(threads)
+            slam = EmbeddedSlam(CAMERA, START, OFTEN, LoopSettings(recent_keyframes=4))
+            follow(slam, frames)
+            result = slam.finish()
+        finally:
+            cv2.setNumThreads(before)
+        assert result.loops
+        return result.trajectory.T_world_camera.tobytes()
+
+    assert answer(1) == answer(3)

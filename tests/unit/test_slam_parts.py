@@ -8,9 +8,9 @@ from scipy.spatial.transform import Rotation
 from dotmask.geometry import inverse, project, transform
 from dotmask.records import Intrinsics
 from dotmask.slam.features import Features
-from dotmask.slam.keyframes import KeyframeStore
+from dotmask.slam.keyframes import Keyframe, KeyframeStore
 from dotmask.slam.local_map import LocalMap
-from dotmask.slam.matching import match_anywhere, match_near
+from dotmask.slam.matching import match_anywhere, match_near, match_within_groups
 from dotmask.slam.pose_solver import PoseSolver
 from dotmask.slam.settings import OdometrySettings
 
@@ -55,6 +55,29 @@ def test_matching_near_equals_loops_over_all_pairs(seed):
     found = match_near(expected, descriptors, features, radius_px=45.0, max_hamming=60, ratio=0.9)
     wanted = plain_matches(expected, descriptors, features, 45.0, 60, 0.9)
     assert len(wanted) > 20
+    assert [tuple(pair) for pair in found.tolist()] == wanted
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_matching_within_groups_equals_loops_over_all_pairs(seed):
+    rng = np.random.default_rng(seed)
+    kinds = random_descriptors(rng, 40)
+    noise = lambda count: np.packbits(rng.random((count, 256)) < 0.04, axis=1)  # noqa: E731 a local formula
+    a_kind, b_kind = rng.integers(0, 40, 60), rng.integers(0, 40, 80)
+    a, b = kinds[a_kind] ^ noise(60), kinds[b_kind] ^ noise(80)
+    a_group, b_group = (a_kind % 3).astype(np.intp), (b_kind % 3).astype(np.intp)
+    a_group[:5], b_group[:5] = 7, 2  # what is alike may still be in different groups, and a group may be of one side
+
+    bits = np.unpackbits(a[:, None] ^ b[None], axis=2).sum(axis=2).astype(int)
+    bits[a_group[:, None] != b_group[None]] = 10**6
+    wanted = []
+    for i, j in np.ndindex(*bits.shape):
+        row, column = np.sort(bits[i])[:2], np.sort(bits[:, j])[:2]
+        is_best = bits[i, j] == row[0] == column[0] and bits[i, j] <= 30
+        if is_best and row[0] < 0.8 * row[1] and column[0] < 0.8 * column[1]:
+            wanted.append((i, j))
+    found = match_within_groups(a, a_group, b, b_group, max_hamming=30, ratio=0.8)
+    assert len(wanted) > 5
     assert [tuple(pair) for pair in found.tolist()] == wanted
 
 
@@ -190,11 +213,11 @@ def test_local_map_points_are_running_means_of_limited_depth():
     np.testing.assert_allclose(local_map.p_world, np.full((1, 3), wanted))
 
 
-def add_keyframe(store: KeyframeStore, index: int, x_m: float) -> None:
+def add_keyframe(store: KeyframeStore, index: int, x_m: float) -> Keyframe | None:
     T = np.eye(4)
     T[0, 3] = x_m
     features = features_at(np.full((2, 2), 100.0), np.zeros((2, 32), np.uint8))
-    store.add(index, float(index), T, features)
+    return store.add(index, float(index), T, features, np.zeros(2, np.intp), np.zeros((480, 640), np.float32))
 
 
 def test_keyframe_is_due_after_motion_or_rotation():
@@ -211,8 +234,8 @@ def test_keyframe_is_due_after_motion_or_rotation():
 
 def test_most_redundant_keyframe_goes_first_and_both_ends_stay():
     store = KeyframeStore(CAMERA, OdometrySettings(max_keyframes=4))
-    for index, x_m in enumerate([0.0, 1.0, 1.1, 2.0, 4.0]):
-        add_keyframe(store, index, x_m)
+    dropped = [add_keyframe(store, index, x_m) for index, x_m in enumerate([0.0, 1.0, 1.1, 2.0, 4.0])]
+    assert [keyframe.number for keyframe in dropped if keyframe is not None] == [2]
     # Without 1 there is a gap of 1.1 m, without 2 of 1.0 m, without 3 of 2.9 m.
     assert [keyframe.frame_index for keyframe in store.keyframes] == [0, 1, 3, 4]
 

@@ -7,13 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
+from tools.asset_files import update_manifest, write_npz
 from tools.bake_humans.body import Body, extract_body
 from tools.bake_humans.cloth_paint import paint_collar, paint_shirt, paint_shoes, paint_trousers
 from tools.bake_humans.clothes import Tailor
 from tools.bake_humans.hair import make_hair, paint_hair
 from tools.bake_humans.head import make_eyes, make_skin
 from tools.bake_humans.mesh import Array, Mesh
-from tools.bake_humans.store import Part, character_arrays, update_manifest, write_npz
+from tools.bake_humans.store import CHANGES, LICENCE, SOURCE, Part, character_arrays
 from tools.bake_humans.styles import STYLES, Outfit, Style
 from tools.bake_humans.texture import bake_map, fill, unwrap
 
@@ -77,7 +78,7 @@ def main() -> None:
                 raise SystemExit(f"{name} in {outfit} has {worn} triangles, at most {MAX_FACES} are allowed")
         file = f"humans/{name}.npz"
         write_npz(args.out / file, character_arrays(body, parts, list(STYLES[name].outfits)))
-        update_manifest(args.out, file)
+        update_manifest(args.out, file, source=SOURCE, licence=LICENCE, changes=CHANGES)
         print(
             f"{name}: {sum(len(p.mesh.faces) for p in parts)} triangles, "
             f"{(args.out / file).stat().st_size / 1e6:.2f} MB, {time.perf_counter() - start:.0f} s"

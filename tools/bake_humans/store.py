@@ -1,13 +1,6 @@
-"""Write a character as one npz without pickled objects, and its entry in the manifest."""
+"""The arrays of a character's file, and what the manifest says of it."""
 
-import hashlib
-import io
-import json
-import os
-import zipfile
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -91,37 +84,3 @@ def character_arrays(body: Body, parts: list[Part], outfits: list[str]) -> dict[
         for outfit, texture in part.textures.items():
             arrays[f"texture_{key}" + (f"_{outfit}" if outfit else "")] = jpeg(texture, JPEG_QUALITY)
     return arrays
-
-
-def write_npz(path: Path, arrays: dict[str, Array]) -> None:
-    """Like `np.savez_compressed`, but with fixed time stamps: the same arrays give the same bytes."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_suffix(".partial")
-    with zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
-        for name, array in arrays.items():
-            buffer = io.BytesIO()
-            np.lib.format.write_array(buffer, np.ascontiguousarray(array), allow_pickle=False)
-            archive.writestr(
-                zipfile.ZipInfo(f"{name}.npy", (1980, 1, 1, 0, 0, 0)), buffer.getvalue(), zipfile.ZIP_DEFLATED, 9
-            )
-    os.replace(partial, path)
-
-
-def update_manifest(root: Path, name: str) -> None:
-    """Set the entry of the file `name` below `root` in `root/manifest.json`; other entries stay."""
-    content = (root / name).read_bytes()
-    path = root / "manifest.json"
-    manifest: dict[str, Any] = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
-    manifest["schema"] = 1
-    files = manifest.setdefault("files", {})
-    files[name] = {
-        "source": SOURCE,
-        "licence": LICENCE,
-        "sha256": hashlib.sha256(content).hexdigest(),
-        "bytes": len(content),
-        "changes": CHANGES,
-    }
-    manifest["files"] = dict(sorted(files.items()))
-    partial = path.with_suffix(".partial")
-    partial.write_text(json.dumps(manifest, indent=2) + "\n", encoding="utf-8")
-    os.replace(partial, path)
