@@ -6,6 +6,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
+from dotmask.geometry import transform
 from dotmask.records import (
     FloatArray,
     Intrinsics,
@@ -21,7 +22,7 @@ from dotmask.records import (
 from dotmask.slam.features import FeatureExtractor, Features
 from dotmask.slam.keyframes import Keyframe, KeyframeStore
 from dotmask.slam.loop_closing import LoopClosing
-from dotmask.slam.odometry import Odometry
+from dotmask.slam.odometry import Odometry, OdometryResult
 from dotmask.slam.settings import LoopSettings, OdometrySettings
 from dotmask.slam.vocabulary import load_vocabulary
 
@@ -34,7 +35,7 @@ class _Seen:
     """What odometry found in the last frame; mapping goes on from it."""
 
     features: Features
-    T_world_camera: FloatArray
+    odometry: OdometryResult
 
 
 class _Pose(NamedTuple):
@@ -103,6 +104,8 @@ class EmbeddedSlam:
         features = self._extractor.extract(grey, masked.mo_mdi_m)
         if self._started:
             result = self._odometry.track(features, frame.timestamp_s)
+            if result is None:
+                result = self._relocalise(features, frame.timestamp_s)
             found_again = self._is_lost or (result is not None and result.is_relocalised)
             status = SlamStatus.RELOCALISED if found_again else SlamStatus.TRACKED
         else:
@@ -112,7 +115,7 @@ class EmbeddedSlam:
         self._seen, self._is_lost = None, self._started and result is None
         if result is None:
             return PoseEstimate(timestamp_s=frame.timestamp_s, T_world_camera=None, status=SlamStatus.LOST, inliers=0)
-        self._seen = _Seen(features=features, T_world_camera=result.T_world_camera)
+        self._seen = _Seen(features=features, odometry=result)
         self._poses.append(_Pose(frame.index, frame.timestamp_s, result.T_world_camera))
         return PoseEstimate(
             timestamp_s=frame.timestamp_s,
@@ -128,11 +131,19 @@ class EmbeddedSlam:
         Nothing happens while lost.
         """
         seen = self._seen
-        if seen is None or not self._store.is_due(seen.T_world_camera):
+        if seen is None or not self._store.is_due(seen.odometry.T_world_camera):
             return
         features = self._extractor.within(seen.features, masked.mdi_m)
         words = self._vocabulary.words_of(features.descriptors)
-        dropped = self._store.add(frame.index, frame.timestamp_s, seen.T_world_camera, features, words, masked.mdi_m)
+        dropped = self._store.add(
+            frame.index,
+            frame.timestamp_s,
+            seen.odometry.T_world_camera,
+            seen.odometry.covariance,
+            features,
+            words,
+            masked.mdi_m,
+        )
         self._loops.add(self._store.keyframes[-1], dropped)
 
     def finish(self) -> SlamResult:
@@ -147,6 +158,15 @@ class EmbeddedSlam:
             ),
             loops=closed.loops,
         )
+
+    def _relocalise(self, features: Features, time_s: float) -> OdometryResult | None:
+        """Find the place among the keyframes, whose points the local map may have lost."""
+        for keyframe in self._loops.places_like(features):
+            p_world = transform(keyframe.T_world_camera, keyframe.p_camera.astype(np.float64))
+            result = self._odometry.relocalise(p_world, keyframe.descriptors, features, time_s)
+            if result is not None:
+                return result
+        return None
 
     def _check(self, frame: RgbdFrame, masked: MaskedDepth) -> None:
         if frame.intrinsics != self._camera:

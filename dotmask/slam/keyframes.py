@@ -22,6 +22,7 @@ class Keyframe:
         frame_index: index of the frame.
         timestamp_s: its time, seconds.
         T_world_camera: (4, 4) pose by odometry.
+        covariance: (6, 6) of it, see `OdometryResult`.
         pixels: (N, 2) float32, corners where the mapping depth (MDI) is valid.
         p_camera: (N, 3) float32, their positions in the camera frame, metres.
         descriptors: (N, 32) uint8.
@@ -33,6 +34,7 @@ class Keyframe:
     frame_index: int
     timestamp_s: float
     T_world_camera: FloatArray
+    covariance: FloatArray
     pixels: npt.NDArray[np.float32]
     p_camera: npt.NDArray[np.float32]
     descriptors: Descriptors
@@ -80,6 +82,7 @@ class KeyframeStore:
         frame_index: int,
         timestamp_s: float,
         T_world_camera: FloatArray,
+        covariance: FloatArray,
         features: Features,
         words: WordIds,
         depth_m: DepthImage,
@@ -90,6 +93,7 @@ class KeyframeStore:
             frame_index: of the frame.
             timestamp_s: of the frame.
             T_world_camera: (4, 4) its pose by odometry.
+            covariance: (6, 6) of the pose.
             features: its corners in the mapping depth.
             words: (N,) their visual words.
             depth_m: (H, W) the mapping depth.
@@ -103,6 +107,7 @@ class KeyframeStore:
                 frame_index=frame_index,
                 timestamp_s=timestamp_s,
                 T_world_camera=T_world_camera,
+                covariance=covariance,
                 pixels=features.pixels.astype(np.float32),
                 p_camera=back_project(features.pixels, features.depth_m, self._camera).astype(np.float32),
                 descriptors=features.descriptors,

@@ -6,16 +6,19 @@ of all keyframes stay, like those of all frames, so that a dropped keyframe take
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from dotmask.geometry import inverse
 from dotmask.records import FloatArray, Intrinsics, LoopClosure, LoopKind
+from dotmask.slam.features import Features
 from dotmask.slam.keyframes import Keyframe, motion
 from dotmask.slam.loop_verification import LoopVerifier
 from dotmask.slam.place_recognition import PlaceRecognition
 from dotmask.slam.pose_graph import Edge, optimise
 from dotmask.slam.settings import LoopSettings, OdometrySettings
+from dotmask.slam.twists import adjoint
 from dotmask.slam.vocabulary import BagOfWords, Vocabulary
 
 
@@ -53,12 +56,31 @@ class ClosedLoops:
         return np.array(poses, np.float64).reshape(-1, 4, 4)
 
 
-def odometry_covariance(T_before: FloatArray, T_after: FloatArray, settings: LoopSettings) -> FloatArray:
-    """Covariance (6, 6) of odometry's motion between two keyframes with the poses (4, 4) that it gave them."""
-    distance_m, angle_rad = motion(T_before, T_after)
-    sigma_rad = settings.odometry_floor_rad + settings.odometry_per_rad * angle_rad
-    sigma_m = settings.odometry_floor_m + settings.odometry_per_m * distance_m
-    return np.diag(np.repeat([sigma_rad, sigma_m], 3) ** 2)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Node:
+    """What the pose graph needs of a keyframe, also of one that was dropped.
+
+    Attributes:
+        frame_index: of its frame.
+        T_world_camera: (4, 4) pose by odometry.
+        covariance: (6, 6) of the pose.
+    """
+
+    frame_index: int
+    T_world_camera: FloatArray
+    covariance: FloatArray
+
+
+def odometry_edge(number: int, before: Node, after: Node, scale: float) -> Edge:
+    """Odometry's motion from keyframe `number` to the next one.
+
+    Both poses were found against the local map, each with an error of its own. What they have in common, the errors of
+    the map's points, is in the factor `scale` on the covariance.
+    """
+    T_before_after = inverse(before.T_world_camera) @ after.T_world_camera
+    A = adjoint(inverse(T_before_after))
+    covariance = scale * (after.covariance + A @ before.covariance @ A.T)
+    return Edge(a=number, b=number + 1, T_a_b=T_before_after, covariance=covariance)
 
 
 class LoopClosing:
@@ -78,8 +100,7 @@ class LoopClosing:
         self._places = PlaceRecognition(len(vocabulary))
         self._verifier = LoopVerifier(intrinsics, vocabulary, settings, loop_settings)
         self._keyframes: dict[int, Keyframe] = {}
-        self._frame_indices: list[int] = []
-        self._odometry: list[FloatArray] = []
+        self._nodes: list[Node] = []
         self._loops: list[_Loop] = []
         self._last_bag: BagOfWords | None = None
 
@@ -107,32 +128,38 @@ class LoopClosing:
                 self._loops.append(_Loop(closure=closure, edge=edge))
                 break
         self._keyframes[keyframe.number] = keyframe
-        self._frame_indices.append(keyframe.frame_index)
-        self._odometry.append(keyframe.T_world_camera)
+        self._nodes.append(
+            Node(
+                frame_index=keyframe.frame_index,
+                T_world_camera=keyframe.T_world_camera,
+                covariance=keyframe.covariance,
+            )
+        )
         self._places.add(keyframe.number, bag)
         self._last_bag = bag
 
     def close(self) -> ClosedLoops:
         """Optimise the poses of all keyframes by odometry and loops."""
-        poses = self._odometry
+        scale = self._settings.odometry_covariance_scale
         chain = [
-            Edge(
-                a=k,
-                b=k + 1,
-                T_a_b=inverse(poses[k]) @ poses[k + 1],
-                covariance=odometry_covariance(poses[k], poses[k + 1], self._settings),
-            )
-            for k in range(len(poses) - 1)
+            odometry_edge(number, before, after, scale) for number, (before, after) in enumerate(pairwise(self._nodes))
         ]
+        poses = [node.T_world_camera for node in self._nodes]
         found = optimise(poses, chain, [loop.edge for loop in self._loops], self._settings.rejection_probability)
         corrections = [T @ inverse(before) for T, before in zip(found.T_world_node, poses, strict=True)]
         return ClosedLoops(
-            frame_indices=tuple(self._frame_indices),
+            frame_indices=tuple(node.frame_index for node in self._nodes),
             T_world_odometry=np.array(corrections).reshape(-1, 4, 4),
             loops=tuple(
                 loop.closure for loop, accepted in zip(self._loops, found.is_accepted, strict=True) if accepted
             ),
         )
+
+    def places_like(self, features: Features) -> tuple[Keyframe, ...]:
+        """The keyframes that look most like an image whose place is unknown, the best first."""
+        bag = self._vocabulary.bag_of(self._vocabulary.words_of(features.descriptors))
+        alike = self._places.similar(bag, count=self._settings.relocalisation_candidates)
+        return tuple(self._keyframes[place.place] for place in alike)
 
     def _candidates(self, keyframe: Keyframe, bag: BagOfWords) -> list[tuple[LoopKind, Keyframe]]:
         """Keyframes that may show the same place: those that look alike, then the one that is nearest."""

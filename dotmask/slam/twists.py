@@ -27,6 +27,15 @@ def halfway(T_a_b: FloatArray, other_T_a_b: FloatArray) -> FloatArray:
     return np.asarray(T_a_b @ exp(0.5 * log(inverse(T_a_b) @ other_T_a_b)))
 
 
+def adjoint(T_a_b: FloatArray) -> FloatArray:
+    """(6, 6) that takes a twist in the frame of b to the same motion in the frame of a."""
+    R = T_a_b[:3, :3]
+    A = np.zeros((6, 6))
+    A[:3, :3] = A[3:, 3:] = R
+    A[3:, :3] = cross(T_a_b[:3, 3]) @ R
+    return A
+
+
 def cross(vectors: FloatArray) -> FloatArray:
     """(..., 3, 3) matrices of the products `vector x ...` of vectors (..., 3)."""
     x, y, z = np.moveaxis(vectors, -1, 0)

@@ -166,6 +166,24 @@ def test_points_of_an_old_place_find_a_camera_that_the_local_map_cannot(frames):
     assert not following.is_relocalised
 
 
+def test_a_keyframe_finds_the_camera_where_the_local_map_has_forgotten(frames):
+    """It sees the left half, then the right half alone until the left is forgotten, then the left half again."""
+    height, width = frames[0].depth_m.shape
+    left = np.broadcast_to(np.arange(width) < width // 2, (height, width))
+    slam = EmbeddedSlam(CAMERA, START, OdometrySettings(features=400, map_points=300, corner_distance_px=4.0))
+    shown = [*(~left for _ in range(2)), *(np.zeros_like(left) for _ in range(1)), *(left for _ in range(3)), ~left]
+    statuses = []
+    for k, hidden in enumerate(shown):
+        frame, _ = render(k)
+        masked = MaskedDepth(mo_mdi_m=without(frame, hidden), mdi_m=without(frame, hidden))
+        estimate = slam.track(frame, masked)
+        slam.update_map(frame, masked)
+        statuses.append(estimate.status)
+    assert statuses[1:-1] == [SlamStatus.TRACKED] * 5
+    assert statuses[-1] is SlamStatus.RELOCALISED
+    assert error(estimate, len(shown) - 1)[0] < 0.01
+
+
 def test_waits_for_features_before_it_starts(frames, blank):
     slam = EmbeddedSlam(CAMERA, START)
     assert slam.track(blank, unmasked(blank)).status is SlamStatus.LOST

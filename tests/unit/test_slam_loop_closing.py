@@ -10,10 +10,10 @@ from dotmask.records import FloatArray, Intrinsics, LoopKind
 from dotmask.slam import loop_closing as module
 from dotmask.slam.coarse_depth import CoarseDepth
 from dotmask.slam.keyframes import Keyframe
-from dotmask.slam.loop_closing import ClosedLoops, LoopClosing, odometry_covariance
+from dotmask.slam.loop_closing import ClosedLoops, LoopClosing, Node, odometry_edge
 from dotmask.slam.loop_verification import VerifiedLoop
 from dotmask.slam.settings import LoopSettings, OdometrySettings
-from dotmask.slam.twists import exp
+from dotmask.slam.twists import exp, log
 from dotmask.slam.vocabulary import Vocabulary
 
 CAMERA = Intrinsics(width=64, height=48, fx=50.0, fy=50.0, cx=31.5, cy=23.5)
@@ -36,6 +36,7 @@ def keyframe(number: int, T_world_camera: FloatArray, place: int) -> Keyframe:
         frame_index=10 * number,
         timestamp_s=float(number),
         T_world_camera=T_world_camera,
+        covariance=1e-6 * np.eye(6),
         pixels=np.zeros((8, 2), np.float32),
         p_camera=np.ones((8, 3), np.float32),
         descriptors=np.zeros((8, 32), np.uint8),
@@ -144,15 +145,23 @@ def test_frames_move_with_the_last_keyframe_not_after_them():
     assert closed.corrected([], []).shape == (0, 4, 4)
 
 
-def test_odometry_is_less_certain_the_further_it_went():
-    s = SETTINGS
-    near = odometry_covariance(at(0.0), at(0.1), s)
-    far = odometry_covariance(at(0.0), at(1.0), s)
-    assert near[3, 3] == pytest.approx((s.odometry_floor_m + 0.1 * s.odometry_per_m) ** 2)
-    assert far[3, 3] == pytest.approx((s.odometry_floor_m + 1.0 * s.odometry_per_m) ** 2)
-    assert near[0, 0] == pytest.approx(s.odometry_floor_rad**2)
-    turned = odometry_covariance(np.eye(4), exp(np.array([0, 0.5, 0, 0, 0, 0])), s)
-    assert turned[0, 0] == pytest.approx((s.odometry_floor_rad + 0.5 * s.odometry_per_rad) ** 2)
+def test_the_covariance_of_a_motion_is_that_of_both_its_ends():
+    rng = np.random.default_rng(2)
+    ends = []
+    for index in range(2):
+        spread = rng.normal(size=(6, 6)) * [1e-3, 1e-3, 1e-3, 2e-3, 2e-3, 2e-3]
+        covariance = spread.T @ spread + 1e-7 * np.eye(6)
+        pose = exp(rng.normal(0, 0.7, 6))
+        ends.append(Node(frame_index=index, T_world_camera=pose, covariance=covariance))
+    edge = odometry_edge(0, *ends, scale=1.5)
+    # Errors are drawn at both ends, and those of the relative pose counted.
+    before, after = (rng.multivariate_normal(np.zeros(6), end.covariance, 4000) for end in ends)
+    errors = [
+        log(inverse(edge.T_a_b) @ inverse(ends[0].T_world_camera @ exp(b)) @ ends[1].T_world_camera @ exp(a))
+        for b, a in zip(before, after, strict=True)
+    ]
+    nees = [error @ np.linalg.solve(edge.covariance, error) for error in errors]
+    assert np.mean(nees) == pytest.approx(6 / 1.5, rel=0.05)
 
 
 @pytest.mark.parametrize(
@@ -160,7 +169,7 @@ def test_odometry_is_less_certain_the_further_it_went():
     [
         ({"recent_keyframes": 0}, "recent_keyframes"),
         ({"min_inliers": 5}, "min_inliers"),
-        ({"odometry_floor_m": 0.0}, "odometry_floor_m"),
+        ({"odometry_covariance_scale": 0.0}, "odometry_covariance_scale"),
         ({"rejection_probability": 0.0}, "rejection_probability"),
     ],
 )

@@ -86,6 +86,7 @@ class Place:
             frame_index=number,
             timestamp_s=float(number),
             T_world_camera=T_world_camera,
+            covariance=1e-6 * np.eye(6),
             pixels=pixels.astype(np.float32),
             p_camera=back_project(pixels, z, CAMERA).astype(np.float32),
             descriptors=descriptors,

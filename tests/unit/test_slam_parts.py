@@ -217,7 +217,9 @@ def add_keyframe(store: KeyframeStore, index: int, x_m: float) -> Keyframe | Non
     T = np.eye(4)
     T[0, 3] = x_m
     features = features_at(np.full((2, 2), 100.0), np.zeros((2, 32), np.uint8))
-    return store.add(index, float(index), T, features, np.zeros(2, np.intp), np.zeros((480, 640), np.float32))
+    return store.add(
+        index, float(index), T, np.eye(6), features, np.zeros(2, np.intp), np.zeros((480, 640), np.float32)
+    )
 
 
 def test_keyframe_is_due_after_motion_or_rotation():
