@@ -44,6 +44,13 @@ Feedback = Annotated[
     str | None, typer.Option(help="Pose for the tracker: previous, constant_velocity, refined. Default: profile's.")
 ]
 Renderer = Annotated[str, typer.Option(help="Renderer: numba, pyrender.")]
+SlamParameters = Annotated[
+    str | None, typer.Option(help="Parameters of RTAB-Map: default, refined.", show_default="default")
+]
+SlamSet = Annotated[
+    list[str] | None,
+    typer.Option(metavar="NAME=VALUE", help="Change one of them, e.g. Vis/MinInliers=12. May be repeated."),
+]
 Threads = Annotated[int, typer.Option(min=1, max=64, help="Threads of the renderer. The bytes do not depend on it.")]
 
 
@@ -224,13 +231,8 @@ def run(
         str | None, typer.Option(help="Segmenter: oracle, none. Default: oracle, of a folder none.")
     ] = None,
     slam: Annotated[str, typer.Option(help="SLAM back end: embedded, rtabmap.")] = "embedded",
-    slam_parameters: Annotated[
-        str | None, typer.Option(help="Parameters of RTAB-Map: default, refined.", show_default="default")
-    ] = None,
-    slam_set: Annotated[
-        list[str] | None,
-        typer.Option(metavar="NAME=VALUE", help="Change one of them, e.g. Vis/MinInliers=12. May be repeated."),
-    ] = None,
+    slam_parameters: SlamParameters = None,
+    slam_set: SlamSet = None,
     profile: Annotated[
         str, typer.Option(help="Parameters of the method: paper, calibrated. original: as the authors' program is.")
     ] = "calibrated",
@@ -249,6 +251,9 @@ def run(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print report.json instead of the table.")] = False,
     video: Annotated[bool, typer.Option(help="Write video.mp4: colour, masks, MO-MDI, trajectories.")] = False,
+    repeat: Annotated[
+        int, typer.Option(help="Run every method so often on the same frames, for a SLAM that differs from run to run.")
+    ] = 1,
     camera: Annotated[str | None, typer.Option(help="Camera of a folder: fr1, fr2, fr3. Default: by its name.")] = None,
     intrinsics: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Camera of a folder: JSON with width, height, fx, fy, cx, cy.")
@@ -288,6 +293,7 @@ def run(
         threads=threads,
         video=video,
         with_map=with_map,
+        repeats=repeat,
     )
     expectations = [expectation(text, settings.methods) for text in expect or []]
     sequence: Source
@@ -520,7 +526,9 @@ def validate(
 
 @app.command()
 def tables(
-    slam: Annotated[str, typer.Option(help="SLAM back end: embedded.")] = "embedded",
+    slam: Annotated[str, typer.Option(help="SLAM back end: embedded, rtabmap.")] = "embedded",
+    slam_parameters: SlamParameters = None,
+    slam_set: SlamSet = None,
     segmenter: Annotated[str, typer.Option(help="Segmenter: oracle.")] = "oracle",
     profile: Annotated[str, typer.Option(help="Parameters of the method: paper, calibrated.")] = "calibrated",
     quick: Annotated[bool, typer.Option("--quick", help="The first 150 frames of each sequence.")] = False,
@@ -529,9 +537,7 @@ def tables(
         typer.Option(help="Runs of each sequence. Default: 5 for rtabmap, which differs from run to run, else 1."),
     ] = None,
     threads: Threads = 2,
-    out: Annotated[
-        Path | None, typer.Option(help="Folder of finished runs. Default: runs/tables-SLAM, with --quick -quick.")
-    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder of finished runs. Default: runs/tables-SLAM.")] = None,
     write: Annotated[bool, typer.Option("--write", help="Write docs/results.md of this checkout too.")] = False,
 ) -> None:
     """The paper's Tables II to IV on the six sequences, its figures beside ours.
@@ -541,18 +547,24 @@ def tables(
     Examples:  dotmask tables --quick
 
     dotmask tables --slam embedded --write
+
+    dotmask tables --slam rtabmap --slam-parameters refined --write
     """
-    from scenarios.run import RunSettings
-    from scenarios.tables.layout import METHODS
     from scenarios.tables.measure import measure
     from scenarios.tables.page import docs_of_checkout, section_text, write_page
     from scenarios.tables.plan import TablePlan
 
-    settings = RunSettings.parse(
-        methods=",".join(METHODS), segmenter=segmenter, slam=slam, profile=profile, threads=threads
+    plan = TablePlan.parse(
+        slam=slam,
+        slam_parameters=slam_parameters,
+        slam_changes=slam_set or (),
+        segmenter=segmenter,
+        profile=profile,
+        threads=threads,
+        repeats=repeat,
+        is_quick=quick,
     )
-    plan = TablePlan.parse(settings, repeats=repeat, is_quick=quick)
-    pages = [out or Path("runs") / f"tables-{slam}{'-quick' if quick else ''}"]
+    pages = [out or Path("runs") / f"tables-{plan.back_end}{'-quick' if quick else ''}"]
     if write:
         pages.append(docs_of_checkout(plan))
     with _progress() as progress:

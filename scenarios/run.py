@@ -61,7 +61,7 @@ class RunSettings:
     """How a sequence is run; what happens in it is the scenario's own business.
 
     Attributes:
-        methods: of `METHODS`.
+        methods: of `METHODS`; `NAME-2` and so on are further runs of the same one, see `method_of`.
         segmenter: of `SEGMENTERS`.
         slam: of `SLAM_BACKENDS`.
         profile: name of the method's parameters.
@@ -98,10 +98,12 @@ class RunSettings:
         with_map: bool = False,
         slam_parameters: str | None = None,
         slam_changes: Sequence[str] = (),
+        repeats: int = 1,
     ) -> "RunSettings":
         """Settings from the words of a command line.
 
-        Without `methods` all are run, or with the segmenter `none`, which leaves nothing to mask, `unmasked` alone.
+        With `repeats` every method is run so often, on the same frames: for what differs from run to run. Without
+        `methods` all are run, or with the segmenter `none`, which leaves nothing to mask, `unmasked` alone.
 
         Raises:
             ScenarioError: a name that does not exist, with near matches; or methods that mask without a segmenter.
@@ -113,6 +115,8 @@ class RunSettings:
         chosen = tuple(dict.fromkeys(m.strip() for m in methods.split(",") if m.strip()))
         if not chosen:
             raise ScenarioError(f"--methods: name at least one of {', '.join(METHODS)}")
+        if repeats < 1:
+            raise ScenarioError(f"--repeat {repeats}: run each method at least once")
         feedback = pose_feedback if pose_feedback is not None else get_profile(profile).pose_feedback
         for kind, name, known in (
             *(("method", m, tuple(METHODS)) for m in chosen),
@@ -129,7 +133,7 @@ class RunSettings:
         if rtabmap is None and (slam_parameters is not None or slam_changes):
             raise ScenarioError(f"--slam-parameters and --slam-set are for --slam rtabmap, not {slam}")
         return cls(
-            methods=chosen,
+            methods=tuple(m if n == 1 else f"{m}-{n}" for n in range(1, repeats + 1) for m in chosen),
             segmenter=segmenter,
             slam=slam,
             profile=profile,
@@ -140,6 +144,11 @@ class RunSettings:
             with_map=with_map,
             rtabmap=rtabmap,
         )
+
+
+def method_of(name: str) -> str:
+    """The method that a name in a report stands for: `dotmask` for `dotmask`, `dotmask-2` and so on."""
+    return name.partition("-")[0]
 
 
 def default_out(scenario: Scenario, prefix: str = "") -> Path:
@@ -195,7 +204,9 @@ def run_source(source: Source, settings: RunSettings, out: Path, advance: Callab
                 start = np.eye(4) if truth.T_world_camera is None else truth.T_world_camera
                 chosen = get_profile(settings.profile)
                 loops = {
-                    name: closed_loop(METHODS[name](segmenter, chosen), settings, frame, start, folder.path / name)
+                    name: closed_loop(
+                        METHODS[method_of(name)](segmenter, chosen), settings, frame, start, folder.path / name
+                    )
                     for name in settings.methods
                 }
                 if settings.video:

@@ -9,7 +9,6 @@ from scenarios.tables.paper import TABLE_II, TABLE_III, TABLE_IV, PaperLoops
 from scenarios.tables.spread import Figure, cell, spread
 from scenarios.validation.section import markdown_table, number
 
-METHODS = ("unmasked", "mdi", "dotmask")
 WITHOUT, WITH = "unmasked", "dotmask"
 """What the paper compares: the SLAM alone, and behind the method."""
 
@@ -17,10 +16,10 @@ STAGES = ("segment", "track", "classify", "mask", "odometry", "map")
 FRONT_END = ("segment", "track", "classify", "mask")
 
 
-def ate_table(reports: Reports) -> str:
+def ate_table(reports: Reports, methods: Sequence[str]) -> str:
     """Table II: ATE of the trajectory after the last frame, with the loops closed, in centimetres."""
     header = [
-        "sequence", *(f"{m}, cm / poses" for m in METHODS), "improvement, %",
+        "sequence", *(f"{m}, cm / poses" for m in methods), "improvement, %",
         "paper: RTAB-Map", "DOTMask", "impr., %", "BaMVO", "Sun et al.", "DynaSLAM",
     ]  # fmt: skip
     rows = []
@@ -29,7 +28,7 @@ def ate_table(reports: Reports) -> str:
         rows.append(
             [
                 f"`{name}`",
-                *_ates(runs, lambda m: m.ate_optimised_rmse_m, lambda m: m.optimised_frames),
+                *_ates(runs, methods, lambda m: m.ate_optimised_rmse_m, lambda m: m.optimised_frames),
                 str(paper.rtabmap),
                 str(paper.dotmask),
                 str(paper.improvement_percent),
@@ -39,15 +38,15 @@ def ate_table(reports: Reports) -> str:
     return markdown_table(header, rows)
 
 
-def odometry_table(reports: Reports) -> str:
+def odometry_table(reports: Reports, methods: Sequence[str]) -> str:
     """ATE and RPE of odometry alone: the poses that were fed back to the tracker."""
-    header = ["sequence", "frames", *(f"{m}, cm / poses" for m in METHODS), "improvement, %"]
+    header = ["sequence", "frames", *(f"{m}, cm / poses" for m in methods), "improvement, %"]
     header += [f"RPE {m}, mm" for m in (WITHOUT, WITH)]
     rows = [
         [
             f"`{name}`",
             str(runs[0].frames),
-            *_ates(runs, lambda m: m.ate_rmse_m, lambda m: m.tracked_frames),
+            *_ates(runs, methods, lambda m: m.ate_rmse_m, lambda m: m.tracked_frames),
             *(cell(runs, method, lambda m: m.rpe_trans_rmse_m, 1, 1e3) for method in (WITHOUT, WITH)),
         ]
         for name, runs in reports.items()
@@ -55,9 +54,9 @@ def odometry_table(reports: Reports) -> str:
     return markdown_table(header, rows)
 
 
-def _ates(runs: Sequence[Report], ate_m: Figure, poses: Figure) -> list[str]:
+def _ates(runs: Sequence[Report], methods: Sequence[str], ate_m: Figure, poses: Figure) -> list[str]:
     """Each method's ATE beside the number of poses it covers, and the improvement of the medians as in the paper."""
-    cells = [f"{cell(runs, method, ate_m, 2, 1e2)} / {cell(runs, method, poses, 0)}" for method in METHODS]
+    cells = [f"{cell(runs, method, ate_m, 2, 1e2)} / {cell(runs, method, poses, 0)}" for method in methods]
     before, after = (spread(runs, method, ate_m) for method in (WITHOUT, WITH))
     if before is None or after is None or before.median == 0:
         return [*cells, "-"]
@@ -91,12 +90,12 @@ def _paper_loops(half: PaperLoops) -> list[str]:
     return [str(half.count), str(half.trans_error_cm), str(half.rot_error_deg)]
 
 
-def time_table(reports: Reports) -> str:
+def time_table(reports: Reports, methods: Sequence[str]) -> str:
     """Table IV: CPU time of a frame by stage, the mean over all frames of all sequences and runs."""
     header = ["method", "frames", *STAGES, "front end", "front end and SLAM"]
     runs = [report for repeats in reports.values() for report in repeats]
     rows = []
-    for method in METHODS:
+    for method in methods:
         by_stage = {stage: _mean_ms(runs, method, stage) for stage in STAGES}
         sums = [_sum(by_stage[stage] for stage in stages) for stages in (FRONT_END, STAGES)]
         cells = [number(ms, 1) for ms in (*by_stage.values(), *sums)]
@@ -134,11 +133,11 @@ MAP_FIGURES: tuple[tuple[str, Figure, float], ...] = (
 )
 
 
-def map_table(reports: Reports) -> str | None:
+def map_table(reports: Reports, methods: Sequence[str]) -> str | None:
     """What is left of moving objects in the map, for the paper's figure of maps; None where no run made one."""
-    header = ["sequence", *(f"{m}: {heading}" for m in METHODS for heading, _, _ in MAP_FIGURES)]
+    header = ["sequence", *(f"{m}: {heading}" for m in methods for heading, _, _ in MAP_FIGURES)]
     rows = [
-        [f"`{name}`", *(cell(runs, method, figure, 1, scale) for method in METHODS for _, figure, scale in MAP_FIGURES)]
+        [f"`{name}`", *(cell(runs, method, figure, 1, scale) for method in methods for _, figure, scale in MAP_FIGURES)]
         for name, runs in reports.items()
     ]
     is_measured = any(text != "-" for row in rows for text in row[1:])

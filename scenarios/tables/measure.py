@@ -4,8 +4,8 @@ import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from scenarios.report import Report
-from scenarios.run import run
+from scenarios.report import MethodReport, Report
+from scenarios.run import method_of, run
 from scenarios.tables.plan import TablePlan
 from scenarios.tables.store import ReportStore, run_key
 
@@ -29,14 +29,24 @@ def measure(plan: TablePlan, out: Path, show: Callable[[str], None], advance: Ca
     reports: dict[str, tuple[Report, ...]] = {}
     for scenario in plan.scenarios():
         key = run_key(plan, scenario)
-        for repeat in range(1, plan.repeats + 1):
-            report = store.load(key, repeat)
-            if report is None:
-                show(scenario.name + (f", run {repeat} of {plan.repeats}" if plan.repeats > 1 else ""))
-                with tempfile.TemporaryDirectory(prefix="dotmask-tables-") as folder:
-                    report = run(scenario, plan.settings, Path(folder) / "run", lambda: advance(1))
-                store.save(key, repeat, report)
-            else:
-                advance(scenario.frames)
-            reports[scenario.name] = (*reports.get(scenario.name, ()), report)
+        report = store.load(key)
+        if report is None:
+            show(scenario.name)
+            with tempfile.TemporaryDirectory(prefix="dotmask-tables-") as folder:
+                report = run(scenario, plan.settings, Path(folder) / "run", lambda: advance(1))
+            store.save(key, report)
+        else:
+            advance(scenario.frames)
+        reports[scenario.name] = split_repeats(report)
     return reports
+
+
+def split_repeats(report: Report) -> tuple[Report, ...]:
+    """One report for each time that the methods were run, each with their plain names."""
+    runs: list[dict[str, MethodReport]] = []
+    for name, method in report.methods.items():
+        plain = method_of(name)
+        if not runs or plain in runs[-1]:
+            runs.append({})
+        runs[-1][plain] = method
+    return tuple(report.model_copy(update={"methods": methods}) for methods in runs)

@@ -50,25 +50,25 @@ def section_text(plan: TablePlan, reports: Reports) -> str:
     """
     times = "once" if plan.repeats == 1 else f"{plan.repeats} times"
     settings = plan.figure_settings()
-    methods = settings.pop("methods")
+    del settings["methods"]
     stated = ", ".join(f"{name.replace('_', ' ')} `{value}`" for name, value in settings.items())
     machine = versions()
     parts = [
-        f"Every sequence was run {times}, methods {', '.join(methods)}: {stated}. "
+        f"Every sequence was run {times}, methods {', '.join(plan.methods)}: {stated}. "
         f"dotmask {machine['dotmask']}, Python {machine['python']}, {machine['machine']}.",
         "### Table II: absolute trajectory error",
         "After the last frame, with the loops closed. The paper's figures in cm.",
-        ate_table(reports),
+        ate_table(reports, plan.methods),
         "Odometry alone, as it was fed back to the tracker:",
-        odometry_table(reports),
+        odometry_table(reports, plan.methods),
         "### Table III: loop closures",
         loop_table(reports),
         "### Table IV: time of a frame",
         TIME_NOTE,
-        time_table(reports),
+        time_table(reports, plan.methods),
         paper_time_table(),
     ]
-    maps = map_table(reports)
+    maps = map_table(reports, plan.methods)
     if maps is not None:
         parts += ["### Maps", "What moving objects left in the map, and how much of the scene is there.", maps]
     if plan.frames is not None:

@@ -63,29 +63,29 @@ class ReportStore:
         except OSError as error:
             raise ScenarioError(f"--out {folder}: cannot be made ({error.strerror})") from error
 
-    def path(self, key: dict[str, Any], repeat: int) -> Path:
+    def path(self, key: dict[str, Any]) -> Path:
         """Where the report of a run lies, or would."""
         digest = hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()
-        return self._folder / f"{key['scenario']['name']}-{repeat}-{digest[:12]}.json"
+        return self._folder / f"{key['scenario']['name']}-{digest[:12]}.json"
 
-    def load(self, key: dict[str, Any], repeat: int) -> Report | None:
+    def load(self, key: dict[str, Any]) -> Report | None:
         """The report of a finished run, None where there is none that can be used."""
         try:
-            content = json.loads(self.path(key, repeat).read_text(encoding="utf-8"))
+            content = json.loads(self.path(key).read_text(encoding="utf-8"))
             if content["key"] != json.loads(json.dumps(key)):
                 return None
             return Report.model_validate(content["report"])
         except (OSError, ValueError, KeyError, TypeError, ValidationError):
             return None
 
-    def save(self, key: dict[str, Any], repeat: int, report: Report) -> None:
+    def save(self, key: dict[str, Any], report: Report) -> None:
         """Keep the report of a finished run, whole or not at all.
 
         Raises:
             ScenarioError: the disk cannot be written to.
         """
         content = {"key": key, "report": report.model_dump(mode="json", by_alias=True)}
-        path = self.path(key, repeat)
+        path = self.path(key)
         try:
             write_atomically(path, json.dumps(content, indent=2) + "\n")
         except OSError as error:

@@ -9,11 +9,11 @@ import pytest
 from scenarios.errors import ScenarioError
 from scenarios.registry import SCENARIOS
 from scenarios.report import LoopReport, MapReport, MethodReport, Report, StageTimes, WorldTimes
-from scenarios.run import RunSettings
+from scenarios.run import METHODS, RunSettings, method_of
 from scenarios.tables import measure as measuring
 from scenarios.tables import page, store
+from scenarios.tables import plan as plan_module
 from scenarios.tables.layout import (
-    METHODS,
     ate_table,
     loop_table,
     map_table,
@@ -21,12 +21,14 @@ from scenarios.tables.layout import (
     paper_time_table,
     time_table,
 )
-from scenarios.tables.measure import measure
+from scenarios.tables.measure import measure, split_repeats
 from scenarios.tables.paper import TABLE_II, TABLE_III
 from scenarios.tables.plan import SEQUENCES, TablePlan
 
 SETTINGS = RunSettings.parse(threads=1)
-PLAN = TablePlan(settings=SETTINGS, repeats=1, frames=7)
+METHOD_NAMES = tuple(METHODS)
+PLAN = TablePlan(back_end="embedded", settings=SETTINGS, methods=METHOD_NAMES, repeats=1, frames=7)
+TWICE = replace(PLAN, settings=RunSettings.parse(threads=1, repeats=2), repeats=2)
 
 
 def method(ate_m: float | None = 0.1, *, frames: int = 100, mask_ms: float | None = None, **more) -> MethodReport:
@@ -75,7 +77,8 @@ def runs(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         done.append(scenario.name)
         for _ in range(scenario.frames):
             advance()
-        return report(scenario.name, scenario.frames, dotmask=method(0.01 * len(done)))
+        one = report(scenario.name, scenario.frames, dotmask=method(0.01 * len(done)))
+        return one.model_copy(update={"methods": {name: one.methods[method_of(name)] for name in settings.methods}})
 
     monkeypatch.setattr(measuring, "run", run)
     return done
@@ -90,19 +93,33 @@ def test_the_six_sequences_of_the_paper_are_run_whole() -> None:
         "fr3_sitting_static", "fr3_sitting_xyz", "fr3_walking_static", "fr3_walking_xyz", "fr3_walking_rpy",
         "fr3_walking_halfsphere",
     )  # fmt: skip
-    whole = TablePlan.parse(SETTINGS)
+    whole = TablePlan.parse()
     assert [one.frames for one in whole.scenarios()] == [SCENARIOS[name].frames for name in SEQUENCES]
-    assert {one.frames for one in TablePlan.parse(SETTINGS, is_quick=True).scenarios()} == {150}
-    assert whole.repeats == 1
-    other = TablePlan.parse(replace(SETTINGS, slam="rtabmap"))
-    assert other.repeats == 5
-    assert TablePlan.parse(replace(SETTINGS, slam="rtabmap"), repeats=2).repeats == 2
-    assert other.total_frames() == 5 * whole.total_frames()
+    assert {one.frames for one in TablePlan.parse(is_quick=True).scenarios()} == {150}
+    assert (whole.back_end, whole.methods, whole.repeats) == ("embedded", METHOD_NAMES, 1)
+
+
+def test_what_differs_from_run_to_run_is_run_five_times_on_the_same_frames(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(plan_module.REPEATS, "embedded", 5)
+    monkeypatch.setitem(plan_module.METHODS, "embedded", ("unmasked", "dotmask"))
+    plan = TablePlan.parse()
+    assert plan.settings.methods[:4] == ("unmasked", "dotmask", "unmasked-2", "dotmask-2")
+    assert len(plan.settings.methods) == 10
+    assert plan.total_frames() == sum(SCENARIOS[name].frames for name in SEQUENCES)
+    assert TablePlan.parse(repeats=2).settings.methods == ("unmasked", "dotmask", "unmasked-2", "dotmask-2")
+
+
+def test_a_report_of_repeats_is_split_into_one_for_each() -> None:
+    methods = {"dotmask": method(0.1), "unmasked": method(0.2), "dotmask-2": method(0.3), "unmasked-2": method(0.4)}
+    first, second = split_repeats(report().model_copy(update={"methods": methods}))
+    assert first.methods == {"dotmask": methods["dotmask"], "unmasked": methods["unmasked"]}
+    assert second.methods == {"dotmask": methods["dotmask-2"], "unmasked": methods["unmasked-2"]}
+    assert split_repeats(report()) == (report(),)
 
 
 def test_after_a_kill_finished_runs_are_not_run_again(tmp_path: Path, runs, monkeypatch) -> None:
-    plan = replace(PLAN, repeats=2)
-    run, stop_before = measuring.run, 5
+    plan = TWICE
+    run, stop_before = measuring.run, 4
 
     def killed(*arguments) -> Report:
         if len(runs) == stop_before:
@@ -112,15 +129,15 @@ def test_after_a_kill_finished_runs_are_not_run_again(tmp_path: Path, runs, monk
     monkeypatch.setattr(measuring, "run", killed)
     with pytest.raises(KeyboardInterrupt):
         measured(plan, tmp_path)
-    assert len(list(tmp_path.iterdir())) == 5
+    assert len(list(tmp_path.iterdir())) == 4
     monkeypatch.setattr(measuring, "run", run)
     frames: list[int] = []
     reports = measure(plan, tmp_path, lambda title: None, frames.append)
-    assert runs == [name for name in SEQUENCES for _ in range(2)], "each run once"
+    assert runs == list(SEQUENCES), "each run once"
     assert sum(frames) == plan.total_frames()
-    assert [r.methods["dotmask"].ate_rmse_m for r in reports["fr3_walking_static"]] == [0.05, 0.06]
+    assert [r.methods["dotmask"].ate_rmse_m for r in reports["fr3_walking_static"]] == [0.03, 0.03]
     assert measured(plan, tmp_path) == reports
-    assert len(runs) == 12
+    assert len(runs) == 6
 
 
 def test_a_half_written_or_foreign_file_is_no_result(tmp_path: Path, runs) -> None:
@@ -152,13 +169,13 @@ def test_other_settings_versions_code_or_frames_are_other_runs(tmp_path: Path, r
 
 def test_every_ate_stands_beside_its_poses() -> None:
     one = report(unmasked=method(0.4, frames=90), mdi=method(None, frames=1), dotmask=method(0.02, frames=98))
-    (row,) = rows(ate_table({"fr3_walking_xyz": (one,)}))
+    (row,) = rows(ate_table({"fr3_walking_xyz": (one,)}, METHOD_NAMES))
     assert row["unmasked, cm / poses"] == "20.00 / 89"
     assert row["mdi, cm / poses"] == "- / 0"
     assert row["dotmask, cm / poses"] == "1.00 / 97"
     assert row["improvement, %"] == "95.00"
     assert (row["paper: RTAB-Map"], row["DOTMask"], row["impr., %"]) == ("24.50", "2.10", "91.42")
-    (row,) = rows(odometry_table({"fr3_walking_xyz": (one,)}))
+    (row,) = rows(odometry_table({"fr3_walking_xyz": (one,)}, METHOD_NAMES))
     assert row["frames"] == "100"
     assert row["unmasked, cm / poses"] == "40.00 / 90"
     assert row["RPE dotmask, mm"] == "1.0"
@@ -167,11 +184,11 @@ def test_every_ate_stands_beside_its_poses() -> None:
 def test_repeats_give_the_median_and_the_range() -> None:
     ates = (0.05, 0.01, 0.03)
     several = tuple(report(dotmask=method(ate, frames=100 - k)) for k, ate in enumerate(ates))
-    (row,) = rows(odometry_table({"fr3_walking_xyz": several}))
+    (row,) = rows(odometry_table({"fr3_walking_xyz": several}, METHOD_NAMES))
     assert row["dotmask, cm / poses"] == "3.00 (1.00 to 5.00) / 99 (98 to 100)"
     assert row["improvement, %"] == "70.00", "of the medians"
     lost = (*several[:2], report(dotmask=method(None)))
-    (row,) = rows(odometry_table({"fr3_walking_xyz": lost}))
+    (row,) = rows(odometry_table({"fr3_walking_xyz": lost}, METHOD_NAMES))
     assert row["dotmask, cm / poses"].startswith("3.00 (1.00 to 5.00) [2 of 3 runs] / ")
 
 
@@ -190,7 +207,7 @@ def test_times_are_means_over_frames() -> None:
         "fr3_walking_xyz": (report(frames=100, dotmask=method(mask_ms=1.0)),),
         "fr3_walking_rpy": (report(frames=300, dotmask=method(mask_ms=3.0)),),
     }
-    by_method = {row["method"]: row for row in rows(time_table(reports))}
+    by_method = {row["method"]: row for row in rows(time_table(reports, METHOD_NAMES))}
     assert by_method["dotmask"]["mask"] == by_method["dotmask"]["front end"] == "2.5"
     assert by_method["dotmask"]["front end and SLAM"] == "14.5"
     assert by_method["unmasked"]["front end"] == "-"
@@ -199,9 +216,9 @@ def test_times_are_means_over_frames() -> None:
 
 
 def test_maps_are_shown_where_they_were_made() -> None:
-    assert map_table({"fr3_walking_xyz": (report(),)}) is None
+    assert map_table({"fr3_walking_xyz": (report(),)}, METHOD_NAMES) is None
     made = report(dotmask=method(map=MapReport(ghost_fraction=0.015, completeness=0.9)))
-    (row,) = rows(map_table({"fr3_walking_xyz": (made,)}) or "")
+    (row,) = rows(map_table({"fr3_walking_xyz": (made,)}, METHOD_NAMES) or "")
     assert row["dotmask: ghosts, %"] == "1.5"
     assert row["unmasked: ghosts, %"] == "-"
 
@@ -219,12 +236,12 @@ def test_the_papers_figures_are_consistent_with_themselves() -> None:
 def test_the_page_holds_a_section_for_each_back_end(tmp_path: Path) -> None:
     reports = {name: (report(name),) for name in SEQUENCES}
     whole = replace(PLAN, frames=None)
-    other = replace(whole, settings=replace(SETTINGS, slam="rtabmap"), repeats=5)
+    other = replace(whole, back_end="rtabmap-refined", settings=replace(SETTINGS, slam="rtabmap"), repeats=5)
     page.write_page(tmp_path, other, page.section_text(other, {n: r * 5 for n, r in reports.items()}))
     path = page.write_page(tmp_path, whole, page.section_text(whole, reports))
     text = path.read_text()
     assert path == tmp_path / "results.md"
-    assert text.index("## SLAM back end `embedded`") < text.index("## SLAM back end `rtabmap`")
+    assert text.index("## SLAM back end `embedded`") < text.index("## SLAM back end `rtabmap-refined`")
     assert text.count("### Table II: ") == text.count("### Table III: ") == text.count("### Table IV: ") == 2
     assert "run once" in text
     assert "run 5 times" in text
@@ -237,7 +254,7 @@ def test_bad_options_are_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     monkeypatch.chdir(tmp_path)
     for arguments, message in (
         (["--slam", "embeded"], "unknown SLAM back end 'embeded'. Did you mean embedded?"),
-        (["--repeat", "0"], "--repeat 0: run each sequence at least once"),
+        (["--repeat", "0"], "--repeat 0: run each method at least once"),
         (["--profile", "papr"], "paper"),
         (["--segmenter", "none"], "without a segmenter nothing is masked"),
         (["--write", "--quick"], "--write: a page from the first frames alone would mislead"),
@@ -265,6 +282,6 @@ def test_the_command_prints_the_tables_and_leaves_them_in_its_folder(tmp_path: P
     done = dotmask("tables", "--quick", "--out", tmp_path / "out")
     assert done.code == 0, done.err
     assert len(runs) == len(SEQUENCES)
-    for method_name in METHODS:
+    for method_name in METHOD_NAMES:
         assert f"{method_name}, cm / poses" in done.out
     assert done.out.strip() in (tmp_path / "out" / "results.md").read_text()
