@@ -4,6 +4,7 @@ stdout is for results, stderr for progress and errors. Exit codes: 0 done, 1 a t
 environment, 3 a bug. Heavy modules are imported inside the verbs, so that `--help` is quick.
 """
 
+import math
 import sys
 import traceback
 from collections.abc import Iterator
@@ -586,6 +587,47 @@ def tables(
     typer.echo(text)
     for folder in pages:
         typer.echo(f"written: {write_page(folder, plan, text)}", err=True)
+
+
+@app.command("eval")
+def evaluate(
+    truth: Annotated[Path, typer.Argument(metavar="TRUTH", help="A TUM trajectory, or a TUM RGB-D folder.")],
+    estimate: Annotated[Path, typer.Argument(metavar="ESTIMATE", help="A TUM trajectory: what your SLAM says.")],
+    max_difference_s: Annotated[
+        float, typer.Option("--max-difference", min=0.0, help="Poses further apart in time are not compared, seconds.")
+    ] = 0.02,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON, in metres and radians.")] = False,
+) -> None:
+    """ATE and RPE of a trajectory, as the tools of the TUM RGB-D benchmark define them.
+
+    Examples:  dotmask eval data/sequence/groundtruth.txt trajectory.txt
+
+    dotmask eval runs/x/trajectory_truth.txt runs/x/trajectory_dotmask.txt --json
+    """
+    import json
+    from dataclasses import asdict
+
+    from dotmask.evaluation.trajectory import absolute_trajectory_error, relative_pose_error
+    from dotmask.tum import read_trajectory
+
+    known = read_trajectory(truth / "groundtruth.txt" if truth.is_dir() else truth)
+    found = read_trajectory(estimate)
+    ate = absolute_trajectory_error(known, found, max_difference_s)
+    rpe = relative_pose_error(known, found, max_difference_s=max_difference_s)
+    if ate is None or rpe is None:
+        raise ScenarioError(
+            f"{estimate}: fewer than three of its {len(found)} poses are within {max_difference_s:g} s of one of the "
+            f"{len(known)} true ones; are the stamps of the same clock?"
+        )
+    if as_json:
+        figures = {"truth_poses": len(known), "estimate_poses": len(found), "ate": asdict(ate), "rpe": asdict(rpe)}
+        typer.echo(json.dumps(figures, indent=2))
+        return
+    typer.echo(
+        f"ATE {1e3 * ate.rmse_m:.1f} mm RMSE (mean {1e3 * ate.mean_m:.1f}, median {1e3 * ate.median_m:.1f}, "
+        f"largest {1e3 * ate.max_m:.1f}) over {ate.poses} of {len(known)} true poses\n"
+        f"RPE {1e3 * rpe.trans_rmse_m:.1f} mm, {math.degrees(rpe.rot_rmse_rad):.2f} deg RMSE from pose to pose"
+    )
 
 
 @app.command()

@@ -2,14 +2,17 @@
 
 import csv
 import importlib.metadata
+import json
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from dotmask.records import Trajectory
 from dotmask.slam.rtabmap.library import core
-from dotmask.tum import read_trajectory
+from dotmask.tum import format_trajectory, read_trajectory
 from scenarios.registry import SCENARIOS
 from scenarios.report import Report
 from scenarios.spec import scenario_from_json
@@ -195,3 +198,36 @@ def test_rtabmap_that_is_not_installed_is_one_line_before_anything_is_rendered(
     assert not (tmp_path / "out").exists()
     assert "-   SLAM rtabmap: RTAB-Map" in dotmask("doctor").out
     core.cache_clear()
+
+
+def test_eval_says_what_the_metrics_say(tmp_path: Path, dotmask) -> None:
+    times = np.arange(20) / 10
+    poses = np.tile(np.eye(4), (20, 1, 1))
+    poses[:, 0, 3], poses[:, 1, 3] = times, np.sin(times)
+    truth = Trajectory(timestamps_s=times, T_world_camera=poses)
+    moved = poses.copy()
+    moved[:, 2, 3] = np.where(np.arange(20) % 2, 0.004, -0.004)
+    (tmp_path / "groundtruth.txt").write_text(format_trajectory(truth))
+    estimate = tmp_path / "estimate.txt"
+    estimate.write_text(format_trajectory(Trajectory(timestamps_s=times[:18], T_world_camera=moved[:18])))
+    for known in (tmp_path, tmp_path / "groundtruth.txt"):
+        done = dotmask("eval", known, estimate)
+        assert (done.code, done.err) == (0, "")
+        assert "ATE 4.0 mm RMSE" in done.out
+        assert "over 18 of 20 true poses" in done.out
+        assert "RPE 8.0 mm, 0.00 deg" in done.out
+    figures = json.loads(dotmask("eval", tmp_path, estimate, "--json").out)
+    assert figures["ate"]["poses"] == figures["estimate_poses"] == 18
+    assert figures["ate"]["rmse_m"] == pytest.approx(0.004, rel=0.01)
+
+
+def test_eval_refuses_what_cannot_be_compared_in_one_line(tmp_path: Path, dotmask) -> None:
+    poses = np.tile(np.eye(4), (5, 1, 1))
+    for name, start in (("a.txt", 0.0), ("b.txt", 1000.0)):
+        trajectory = Trajectory(timestamps_s=start + np.arange(5), T_world_camera=poses)
+        (tmp_path / name).write_text(format_trajectory(trajectory))
+    for estimate, message in (("b.txt", "are the stamps of the same clock?"), ("no.txt", "no such file")):
+        done = dotmask("eval", tmp_path / "a.txt", tmp_path / estimate)
+        assert done.code == 2
+        assert message in done.err
+        assert len(done.err.strip().splitlines()) == 1
