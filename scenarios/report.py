@@ -276,12 +276,14 @@ def _number(value: float | None, scale: float = 1.0, digits: int = 1) -> str:
 
 COLUMNS: tuple[tuple[str, Callable[[MethodReport, Report], str]], ...] = (
     ("ATE\nmm", lambda m, _: _number(m.ate_rmse_m, 1e3)),
+    ("opt.\nmm", lambda m, _: _number(m.ate_optimised_rmse_m, 1e3)),
+    ("loops", lambda m, _: "-" if m.loops.count is None else str(m.loops.count)),
     ("RPE\nmm", lambda m, _: _number(m.rpe_trans_rmse_m, 1e3)),
-    ("frames\nlost", lambda m, r: str(r.frames - m.tracked_frames)),
+    ("lost", lambda m, r: str(r.frames - m.tracked_frames)),
     ("EKF\nmm", lambda m, _: _number(m.ekf.position_rmse_ideal_m, 1e3, 0)),
     ("EKF\nm/s", lambda m, _: _number(m.ekf.velocity_rmse_m_s, 1, 2)),
     ("MOC\nprec.", lambda m, _: _number(m.moc.precision, 1, 3)),
-    ("MOC\nrecall", lambda m, _: _number(m.moc.recall, 1, 3)),
+    ("MOC\nrec.", lambda m, _: _number(m.moc.recall, 1, 3)),
     ("leak\n%", lambda m, _: _number(m.masks.leak, 100)),
     ("waste\n%", lambda m, _: _number(m.masks.waste, 100)),
 )

@@ -29,7 +29,7 @@ def sheet(chosen: Scenario) -> npt.NDArray[np.uint8]:
     """(H, W, 3) RGB: COLUMNS x ROWS frames from the first to the last, with their times."""
     simulator = build_simulator(chosen, "numba", 1)
     tiles = []
-    for index in np.linspace(0, chosen.frames - 1, COLUMNS * ROWS).round().astype(int).tolist():
+    for index in np.linspace(0, len(simulator) - 1, COLUMNS * ROWS).round().astype(int).tolist():
         images, _ = simulator.render(index)
         tile = cv2.resize(images.rgb, TILE_PX, interpolation=cv2.INTER_AREA)
         _write(tile, f"{simulator.time_s(index):.1f} s", (5, TILE_PX[1] - 7))

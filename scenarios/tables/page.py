@@ -50,8 +50,11 @@ def section_text(plan: TablePlan, reports: Reports) -> str:
     """
     times = "once" if plan.repeats == 1 else f"{plan.repeats} times"
     settings = plan.figure_settings()
-    del settings["methods"]
+    del settings["methods"], settings["rtabmap"]
     stated = ", ".join(f"{name.replace('_', ' ')} `{value}`" for name, value in settings.items())
+    if plan.settings.rtabmap is not None:
+        changed = ", ".join(f"`{name}={value}`" for name, value in plan.settings.rtabmap.parameters.items())
+        stated += f"; RTAB-Map's parameters but for {changed}"
     machine = versions()
     parts = [
         f"Every sequence was run {times}, methods {', '.join(plan.methods)}: {stated}. "

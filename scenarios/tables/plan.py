@@ -20,7 +20,7 @@ REPEATS = {"rtabmap": 5}
 METHODS = {"rtabmap": ("unmasked", "dotmask")}
 """Methods by SLAM back end; all where it is not named. RTAB-Map takes long, and `mdi` is not in the paper's tables."""
 
-NO_INFLUENCE = ("threads", "video")
+NO_INFLUENCE = ("threads", "video", "with_map")
 """Settings that change no figure but times."""
 
 
