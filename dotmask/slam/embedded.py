@@ -20,6 +20,7 @@ from dotmask.records import (
     checked,
 )
 from dotmask.slam.features import FeatureExtractor, Features
+from dotmask.slam.frame_check import check_next_frame
 from dotmask.slam.keyframes import Keyframe, KeyframeStore
 from dotmask.slam.loop_closing import LoopClosing
 from dotmask.slam.odometry import Odometry, OdometryResult
@@ -98,7 +99,7 @@ class EmbeddedSlam:
         Raises:
             ValueError: the frame has other intrinsics, the masked depth another size, or the time does not rise.
         """
-        self._check(frame, masked)
+        check_next_frame(frame, masked, self._camera, self._last_time_s)
         self._last_time_s = frame.timestamp_s
         grey = np.asarray(cv2.cvtColor(frame.rgb, cv2.COLOR_RGB2GRAY), dtype=np.uint8)
         features = self._extractor.extract(grey, masked.mo_mdi_m)
@@ -167,11 +168,3 @@ class EmbeddedSlam:
             if result is not None:
                 return result
         return None
-
-    def _check(self, frame: RgbdFrame, masked: MaskedDepth) -> None:
-        if frame.intrinsics != self._camera:
-            raise ValueError(f"frame {frame.index}: its intrinsics are not those the back end was made for")
-        if masked.mo_mdi_m.shape != frame.depth_m.shape:
-            raise ValueError(f"frame {frame.index}: masked depth of {masked.mo_mdi_m.shape}, not {frame.depth_m.shape}")
-        if self._last_time_s is not None and frame.timestamp_s <= self._last_time_s:
-            raise ValueError(f"frame {frame.index}: time {frame.timestamp_s} is not after {self._last_time_s}")

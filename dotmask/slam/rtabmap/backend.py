@@ -31,6 +31,7 @@ from dotmask.records import (
     Trajectory,
     checked_pose,
 )
+from dotmask.slam.frame_check import check_next_frame
 from dotmask.slam.rtabmap.library import find_libraries, worker_command, worker_environment
 from dotmask.slam.rtabmap.protocol import (
     COUNTS,
@@ -146,7 +147,7 @@ class RtabmapSlam:
             ValueError: the frame has other intrinsics, the masked depth another size, or the time does not rise.
             SlamError: RTAB-Map has failed, ended, or does not answer.
         """
-        self._check(frame, masked)
+        check_next_frame(frame, masked, self._camera, None if self._last is None else self._last.timestamp_s)
         self._last, self._frame_id = frame, self._frame_id + 1
         # Without a node there is no map to come back to, and the next odometry's would pass for it.
         if self._has_node and 0 < self._settings.restart_after <= self._lost:
@@ -253,14 +254,6 @@ class RtabmapSlam:
     def _is_due(self, time_s: float) -> bool:
         # Stamps are rounded; a node that is a microsecond early is not a frame late.
         return self._mapped_s is None or time_s - self._mapped_s >= self._settings.mapping_period_s - 1e-6
-
-    def _check(self, frame: RgbdFrame, masked: MaskedDepth) -> None:
-        if frame.intrinsics != self._camera:
-            raise ValueError(f"frame {frame.index}: its intrinsics are not those the back end was made for")
-        if masked.mo_mdi_m.shape != frame.depth_m.shape:
-            raise ValueError(f"frame {frame.index}: masked depth of {masked.mo_mdi_m.shape}, not {frame.depth_m.shape}")
-        if self._last is not None and frame.timestamp_s <= self._last.timestamp_s:
-            raise ValueError(f"frame {frame.index}: time {frame.timestamp_s} is not after {self._last.timestamp_s}")
 
 
 def read_graph(payload: bytes) -> Graph:
