@@ -4,6 +4,7 @@ from pathlib import Path
 
 from dotmask.atomic_file import write_atomically
 from scenarios.errors import ScenarioError
+from scenarios.finished_runs import figure_settings
 from scenarios.run_folder import versions
 from scenarios.tables.layout import ate_table, loop_table, map_table, odometry_table, paper_time_table, time_table
 from scenarios.tables.measure import Reports
@@ -49,7 +50,7 @@ def section_text(plan: TablePlan, reports: Reports) -> str:
         reports: what came of it.
     """
     times = "once" if plan.repeats == 1 else f"{plan.repeats} times"
-    settings = plan.figure_settings()
+    settings = figure_settings(plan.settings)
     del settings["methods"]
     stated = ", ".join(f"{name.replace('_', ' ')} `{value}`" for name, value in settings.items())
     machine = versions()
