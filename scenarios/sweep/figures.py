@@ -194,6 +194,7 @@ def _short(value: Any) -> str:
 
 NOTE = (
     f"Lines: median over the seeds, bands: its {100 * CONFIDENCE:.0f} % bootstrap interval. Diamonds: breakdown "
-    f"points. Crosses at the upper edge: the median run has no error, or lost more than {100 * LOST_SHARE:.0f} % of its frames."
+    "points. Crosses at the upper edge: the median run has no error, or lost more than "
+    f"{100 * LOST_SHARE:.0f} % of its frames."
 )
 """How to read the plots."""

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from dotmask.records import FloatArray, IntArray
+from dotmask.records import FloatArray
 from scenarios.errors import ScenarioError
 from scenarios.sweep.table import Row
 from sim.randomness import child
@@ -125,7 +126,7 @@ def series_of(rows: Sequence[Row], axes: Axes) -> list[Series]:
     return found
 
 
-def resampled(seeds: int) -> IntArray:
+def resampled(seeds: int) -> NDArray[np.int64]:
     """(RESAMPLES, seeds) numbers of seeds, drawn with replacement; the same ones in every process."""
     return child(0, "sweep-bootstrap", seeds).integers(seeds, size=(RESAMPLES, seeds))
 
@@ -175,7 +176,7 @@ class Breakdown:
         else:
             near = self.smallest if self.is_rising else self.largest
             told = f"broken at {near:g} already"
-        if self.low is None or self.high is None:
+        if self.low is None or self.high is None or (not self.is_reached and self.low == self.high):
             return told
         return f"{told} [{self._bound(self.low)} to {self._bound(self.high)}]"
 
