@@ -9,6 +9,7 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes as PlotAxes
 from matplotlib.colors import LogNorm
+from matplotlib.patches import Rectangle
 from matplotlib.ticker import FuncFormatter, NullFormatter, NullLocator
 
 from dotmask.records import FloatArray
@@ -24,7 +25,14 @@ ROOM = 1.6
 
 def told(others: Mapping[str, Any]) -> str:
     """What is fixed in a panel."""
-    return ", ".join(f"{key} {value}" for key, value in others.items())
+    return ", ".join(f"{key} {shown(value)}" for key, value in others.items())
+
+
+def shown(value: Any) -> str:
+    """A value of a parameter, for people."""
+    if value is None:
+        return "-"
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def panels(series: Sequence[Series]) -> list[list[Series]]:
@@ -112,11 +120,11 @@ def _limits(series: Sequence[Series], bound_m: float) -> tuple[float, float]:
 
 def _label_x(axis: PlotAxes, axes: Axes) -> None:
     if not axes.is_numeric:
-        axis.set_xticks(range(len(axes.values)), [str(value) for value in axes.values])
+        axis.set_xticks(range(len(axes.values)), [shown(value) for value in axes.values])
         return
     if min(axes.values) > 0 and len(axes.values) > 1:
         axis.set_xscale("log")
-    axis.set_xticks(axes.values, [f"{value:g}" for value in axes.values])
+    axis.set_xticks(axes.values, [shown(value) for value in axes.values])
     axis.xaxis.set_minor_locator(NullLocator())
     axis.xaxis.set_minor_formatter(NullFormatter())
 
@@ -129,7 +137,7 @@ def draw_heat_maps(path: Path, title: str, axes: Axes, series: Sequence[Series],
         title: of the figure.
         axes: of the sweep; at least two keys are varied.
         series: all of them.
-        bound_m: cells above it are framed.
+        bound_m: cells above it are framed in black.
     """
     second, *rest = axes.others
     methods = list(dict.fromkeys(one.method for one in series))
@@ -138,9 +146,8 @@ def draw_heat_maps(path: Path, title: str, axes: Axes, series: Sequence[Series],
     columns = [float(v) for v in axes.values] if axes.is_numeric else [float(k) for k in range(len(axes.values))]
     low_m, high_m = _limits(series, bound_m)
     norm = LogNorm(1e3 * low_m * ROOM, 1e3 * high_m / ROOM)
-    colours = matplotlib.colormaps["YlOrRd"].copy()
-    colours.set_bad("#eeeeee")
-    width_in, height_in = 1.3 + 0.72 * len(columns), 0.9 + 0.5 * len(values)
+    colours = matplotlib.colormaps["YlOrRd"].with_extremes(bad="#eeeeee")
+    width_in, height_in = 1.0 + 0.6 * len(columns), 0.9 + 0.5 * len(values)
     with figure_file(path, 1.0 + width_in * len(methods), 0.7 + height_in * len(fixed)) as figure:
         figure.suptitle(title, fontsize=11, fontweight="bold")
         grid = figure.subplots(len(fixed), len(methods), squeeze=False)
@@ -152,15 +159,15 @@ def draw_heat_maps(path: Path, title: str, axes: Axes, series: Sequence[Series],
                 if one.method == method and tuple(one.others[key] for key in rest) == others:
                     places = [columns.index(x) for x in one.x]
                     cells[values.index(one.others[second]), places] = 1e3 * one.median_m
-            shown = np.ma.masked_invalid(np.where(np.isinf(cells), 1e3 * high_m, cells))
-            image = axis.imshow(shown, norm=norm, cmap=colours, aspect="auto", origin="lower")
+            known = np.ma.masked_invalid(np.where(np.isinf(cells), 1e3 * high_m, cells))
+            image = axis.imshow(known, norm=norm, cmap=colours, aspect="auto", origin="lower")
             for row, place in np.ndindex(cells.shape):
                 value_mm = float(cells[row, place])
                 _write_cell(axis, place, row, value_mm, float(norm(min(value_mm, 1e3 * high_m))))
                 if value_mm > 1e3 * bound_m:
                     axis.add_patch(_frame(place, row))
-            axis.set_xticks(range(len(columns)), [_short(value) for value in axes.values], fontsize=8)
-            axis.set_yticks(range(len(values)), [_short(value) for value in values], fontsize=8)
+            axis.set_xticks(range(len(columns)), [shown(value) for value in axes.values], fontsize=8)
+            axis.set_yticks(range(len(values)), [shown(value) for value in values], fontsize=8)
             axis.set_xlabel(axes.x, fontsize=9)
             if column == 0:
                 axis.set_ylabel(second, fontsize=9)
@@ -182,19 +189,13 @@ def _write_cell(axis: PlotAxes, x: int, y: int, value_mm: float, depth: float) -
     axis.text(x, y, text, ha="center", va="center", fontsize=8, color="white" if depth > 0.6 else "black")
 
 
-def _frame(x: int, y: int) -> Any:
-    from matplotlib.patches import Rectangle
-
-    return Rectangle((x - 0.47, y - 0.45), 0.94, 0.9, fill=False, edgecolor="#b00020", linewidth=1.2, linestyle="--")
-
-
-def _short(value: Any) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value)
+def _frame(x: int, y: int) -> Rectangle:
+    return Rectangle((x - 0.47, y - 0.45), 0.94, 0.9, fill=False, edgecolor="black", linewidth=1.3)
 
 
 NOTE = (
     f"Lines: median over the seeds, bands: its {100 * CONFIDENCE:.0f} % bootstrap interval. Diamonds: breakdown "
     "points. Crosses at the upper edge: the median run has no error, or lost more than "
-    f"{100 * LOST_SHARE:.0f} % of its frames."
+    f"{100 * LOST_SHARE:.0f} % of its frames. Frames in the heat map: above the bound."
 )
 """How to read the plots."""

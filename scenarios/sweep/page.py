@@ -12,7 +12,7 @@ import numpy as np
 
 from dotmask.atomic_file import write_atomically
 from scenarios.errors import ScenarioError
-from scenarios.sweep.figures import NOTE, draw_errors, draw_heat_maps, told
+from scenarios.sweep.figures import NOTE, draw_errors, draw_heat_maps, shown, told
 from scenarios.sweep.run import PLAN, RUNS
 from scenarios.sweep.statistics import Axes, Breakdown, Series, breakdown, gain, series_of
 from scenarios.sweep.table import TABLE, Row, read_table
@@ -96,7 +96,7 @@ def breakdown_rows(analysis: Analysis) -> Iterator[tuple[list[str], str, str]]:
     """The other parameters, the method and its breakdown point, a line for each series."""
     for one, point in zip(analysis.series, analysis.breakdowns, strict=True):
         if point is not None:
-            yield [str(value) for value in one.others.values()], one.method, point.text()
+            yield [shown(value) for value in one.others.values()], one.method, point.text()
 
 
 def summary_rows(analysis: Analysis) -> Iterator[list[str]]:
@@ -108,10 +108,10 @@ def summary_rows(analysis: Analysis) -> Iterator[list[str]]:
         band, better = one.band_m(), gain(one, base)
         shared = {x: k for k, x in enumerate(np.intersect1d(one.x, base.x))}
         for k, x in enumerate(one.x):
-            value = x if analysis.axes.is_numeric else names[int(x)]
+            value = float(x) if analysis.axes.is_numeric else names[int(x)]
             yield [
-                *(str(other) for other in one.others.values()),
-                f"{value:g}" if analysis.axes.is_numeric else str(value),
+                *(shown(other) for other in one.others.values()),
+                shown(value),
                 one.method,
                 _millimetres(one.median_m[k]),
                 "-" if band is None else f"{_millimetres(band[0, k])} to {_millimetres(band[1, k])}",
@@ -254,8 +254,8 @@ def _table(header: Sequence[str], rows: Sequence[Sequence[str]], texts: int) -> 
 
 
 def _list(values: Sequence[Any]) -> str:
-    return ", ".join(f"{value:g}" if isinstance(value, float) else str(value) for value in values)
+    return ", ".join(shown(value) for value in values)
 
 
 def _text(value: Any) -> str:
-    return html.escape("-" if value is None else f"{value:g}" if isinstance(value, float) else str(value))
+    return html.escape(shown(value))
