@@ -12,7 +12,7 @@ import signal
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
@@ -22,6 +22,7 @@ from scenarios.errors import ScenarioError
 from scenarios.sweep.cells import Cell, Done, failed
 
 Work = Callable[[Cell], Done]
+Executed = Generator[tuple[Cell, Done], None, None]
 
 ONE_THREAD = {
     name: "1"
@@ -41,7 +42,7 @@ def cores() -> int:
     return len(os.sched_getaffinity(0))
 
 
-def run_local(work: Work, cells: Sequence[Cell], jobs: int) -> Iterator[tuple[Cell, Done]]:
+def run_local(work: Work, cells: Sequence[Cell], jobs: int) -> Executed:
     """Every cell in a new process, `jobs` of them at a time; they end when this process does, however it ends."""
     context = multiprocessing.get_context("spawn")
     waiting = deque(cells)
@@ -116,7 +117,7 @@ def _environment(variables: dict[str, str]) -> Iterator[None]:
                 os.environ[name] = value
 
 
-def run_ray(work: Work, cells: Sequence[Cell], address: str | None) -> Iterator[tuple[Cell, Done]]:
+def run_ray(work: Work, cells: Sequence[Cell], address: str | None) -> Executed:
     """Every cell as a task of one core in a new process of a Ray cluster, which schedules and retries it.
 
     Args:

@@ -3,8 +3,8 @@
 import fcntl
 import shutil
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,15 +14,15 @@ from scenarios.finished_runs import FinishedRuns
 from scenarios.run_folder import RunFolder
 from scenarios.sweep.cells import Cell, CellResult, Done
 from scenarios.sweep.plan import SweepPlan
-from scenarios.sweep.table import TABLE, rows_of, write_table
+from scenarios.sweep.table import TABLE, Row, rows_of, write_table
 
 PLAN, CELLS, RUNS, LOCK = "sweep.json", "cells", "runs", ".dotmask-sweep.lock"
 """In the folder of a sweep: the plan, the finished cells, the kept run folders, and what keeps a second sweep out."""
 
-TABLE_EVERY_S = 2.0
-"""How often the table is renewed while cells are done, at most."""
+TABLE_EVERY_S, TABLE_SHARE = 2.0, 0.05
+"""How often the table is renewed while cells are done, at most, and what share of the time that may take."""
 
-Executor = Callable[[Sequence[Cell]], Iterator[tuple[Cell, Done]]]
+Executor = Callable[[Sequence[Cell]], Generator[tuple[Cell, Done], None, None]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,37 +62,40 @@ def sweep(
     with _folder(out):
         finished = FinishedRuns(out / CELLS, CellResult)
         _write(out / PLAN, plan.to_json())
-        results: dict[str, CellResult] = {}
+        rows: dict[str, list[Row]] = {}
         for cell in plan.cells:
             result = finished.load(cell.key)
             if result is None or (retry_failed and result.error is not None):
                 continue
             if keep_runs and result.error is None and not (out / RUNS / cell.name).is_dir():
                 continue
-            results[cell.name] = result
-        before, written_s = len(results), 0.0
+            rows[cell.name] = list(rows_of(cell, result))
+        before, next_s = len(rows), 0.0
 
         def progress() -> Progress:
-            failed = sum(result.error is not None for result in results.values())
-            return Progress(done=len(results), failed=failed, before=before)
+            failed = sum(of_cell[0]["error"] is not None for of_cell in rows.values())
+            return Progress(done=len(rows), failed=failed, before=before)
 
         show(progress())
-        for cell, done in execute([cell for cell in plan.cells if cell.name not in results]):
-            if keep_runs and done.files:
-                _keep(out / RUNS / cell.name, done)
-            finished.save(cell.key, done.result)
-            results[cell.name] = done.result
-            if time.monotonic() - written_s > TABLE_EVERY_S:
-                _write_table(out, plan, results)
-                written_s = time.monotonic()
-            show(progress())
-        _write_table(out, plan, results)
+        with closing(execute([cell for cell in plan.cells if cell.name not in rows])) as executed:
+            for cell, done in executed:
+                if keep_runs and done.files:
+                    _keep(out / RUNS / cell.name, done)
+                finished.save(cell.key, done.result)
+                rows[cell.name] = list(rows_of(cell, done.result))
+                start_s = time.monotonic()
+                if start_s > next_s:
+                    _write_table(out, plan, rows)
+                    now_s = time.monotonic()
+                    next_s = now_s + max(TABLE_EVERY_S, (now_s - start_s) / TABLE_SHARE)
+                show(progress())
+        _write_table(out, plan, rows)
         return progress()
 
 
-def _write_table(out: Path, plan: SweepPlan, results: dict[str, CellResult]) -> None:
-    done = [(cell, results[cell.name]) for cell in plan.cells if cell.name in results]
-    write_table(out / TABLE, [row for cell, result in done for row in rows_of(cell, result)], plan.varied)
+def _write_table(out: Path, plan: SweepPlan, rows: dict[str, list[Row]]) -> None:
+    in_order = [row for cell in plan.cells for row in rows.get(cell.name, ())]
+    write_table(out / TABLE, in_order, plan.varied)
 
 
 def _keep(folder: Path, done: Done) -> None:

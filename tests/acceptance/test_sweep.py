@@ -4,7 +4,7 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
@@ -14,8 +14,8 @@ import pytest
 from scenarios.registry import scenario
 from scenarios.run import RunSettings, run
 from scenarios.spec import Scenario, with_overrides
-from scenarios.sweep.cells import Cell, Done, run_cell
-from scenarios.sweep.executors import run_ray
+from scenarios.sweep.cells import Cell, run_cell
+from scenarios.sweep.executors import Executed, run_ray
 from scenarios.sweep.plan import SweepPlan
 from scenarios.sweep.run import sweep
 from scenarios.sweep.table import is_time, read_table
@@ -37,7 +37,7 @@ def whole_plan() -> SweepPlan:
     return SweepPlan.parse(tiny(), vary=["camera.speed=1,2,4"], methods="unmasked,dotmask")
 
 
-def inline(cells: Sequence[Cell]) -> Iterator[tuple[Cell, Done]]:
+def inline(cells: Sequence[Cell]) -> Executed:
     return ((cell, run_cell(cell)) for cell in cells)
 
 

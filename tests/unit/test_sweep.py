@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +19,7 @@ from scenarios.report import MethodReport, Report, StageTimes, WorldTimes
 from scenarios.spec import scenario_from_json
 from scenarios.sweep import page
 from scenarios.sweep.cells import Cell, CellResult, Done
+from scenarios.sweep.executors import Executed
 from scenarios.sweep.plan import SweepPlan
 from scenarios.sweep.run import Progress, sweep
 from scenarios.sweep.statistics import Axes, Series, breakdown, crossing, gain, series_of
@@ -63,7 +64,7 @@ def stub(cell: Cell) -> Done:
     return Done(result=CellResult(report=report, wall_s=time.perf_counter()), files={"report.json": b"{}"})
 
 
-def inline(cells: Sequence[Cell]) -> Iterator[tuple[Cell, Done]]:
+def inline(cells: Sequence[Cell]) -> Executed:
     """An executor that runs the stub here, the last cell first: the order must not matter."""
     return ((cell, stub(cell)) for cell in reversed(cells))
 
@@ -140,7 +141,7 @@ def test_a_foreign_folder_and_a_second_sweep_are_refused(tmp_path: Path) -> None
         sweep(plan(), tmp_path, inline)
     assert [p.name for p in tmp_path.iterdir()] == ["thesis.tex"]
 
-    def inside(cells: Sequence[Cell]) -> Iterator[tuple[Cell, Done]]:
+    def inside(cells: Sequence[Cell]) -> Executed:
         with pytest.raises(ScenarioError, match="another sweep is running there"):
             sweep(plan(), tmp_path / "out", inline)
         return inline(cells)
@@ -180,7 +181,7 @@ def test_a_failed_cell_is_a_row_with_its_error_and_is_not_run_again(tmp_path: Pa
     assert {r["ate_rmse_m"] for r in failed} == {r["frame_hash"] for r in failed} == {None}
     asked: list[Cell] = []
 
-    def ask(cells: Sequence[Cell]) -> Iterator[tuple[Cell, Done]]:
+    def ask(cells: Sequence[Cell]) -> Executed:
         asked.extend(cells)
         return inline(cells)
 
