@@ -14,6 +14,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 from typing import cast
@@ -53,7 +54,7 @@ def run_local(work: Work, cells: Sequence[Cell], jobs: int) -> Executed:
                 cell = waiting.popleft()
                 answers, answer = context.Pipe(duplex=False)
                 process = context.Process(target=_in_process, args=(work, cell, answer), name=cell.name)
-                with _environment(ONE_THREAD):
+                with _environment(ONE_THREAD), _no_interrupt():
                     process.start()
                 answer.close()  # the child has its own: when that one is gone, nobody can answer any more
                 running[answers] = cell, process
@@ -88,6 +89,7 @@ def _in_process(work: Work, cell: Cell, answer: Connection) -> None:
     signal.signal(signal.SIGINT, signal.default_int_handler)
     threading.Thread(target=_end_with_the_parent, daemon=True).start()
     try:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
         answer.send(work(cell))
     except KeyboardInterrupt:
         return
@@ -115,6 +117,17 @@ def _environment(variables: dict[str, str]) -> Iterator[None]:
                 del os.environ[name]
             else:
                 os.environ[name] = value
+
+
+@contextmanager
+def _no_interrupt() -> Iterator[None]:
+    """An interrupt waits until the block has ended; a process that is started in it begins in the same way."""
+    resource_tracker.ensure_running()  # lets interrupts through again when it is started, so that is done before
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def run_ray(work: Work, cells: Sequence[Cell], address: str | None) -> Executed:

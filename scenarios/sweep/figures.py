@@ -54,7 +54,8 @@ def draw_errors(path: Path, title: str, axes: Axes, series: Sequence[Series], bo
         bound_m: where a method counts as broken down.
     """
     groups = panels(series)
-    columns = min(MOST_COLUMNS, len(groups))
+    # The last of the other parameters changes from panel to panel, so a line of panels holds all its values.
+    columns = min(MOST_COLUMNS, len({one.others[axes.others[-1]] for one in series}) if axes.others else 1)
     lines = -(-len(groups) // columns)
     low_m, high_m = _limits(series, bound_m)
     with figure_file(path, max(6.4, 4.6 * columns), 0.5 + 4.9 * lines) as figure:
