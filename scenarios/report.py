@@ -358,10 +358,8 @@ class Expectation(BaseModel):
 
     def verdict(self, report: Report) -> tuple[bool, float | None]:
         """Whether it holds, and the measured figure. A figure that was not measured does not hold."""
-        value: object = report.methods[self.method]
-        for part in self.path:
-            value = getattr(value, part)
-        if not isinstance(value, int | float):
+        value = figure(report.methods[self.method], ".".join(self.path))
+        if value is None:
             return False, None
         return COMPARISONS[self.sign](float(value), self.bound), float(value)
 
@@ -398,6 +396,24 @@ def expectation(text: str, methods: tuple[str, ...]) -> Expectation:
     except ValueError:
         raise ScenarioError(f"--expect {text}: '{number}' is no number") from None
     return Expectation(text=text, method=method, path=tuple(parts), sign=sign, bound=bound)
+
+
+def figure_types(model: type[BaseModel] = MethodReport, prefix: str = "") -> dict[str, type]:
+    """All figures of a method that are one number: dotted names (`masks.leak`) to `int` or `float`, in order."""
+    found: dict[str, type] = {}
+    for name, field in model.model_fields.items():
+        inner = field.annotation
+        if isinstance(inner, type) and issubclass(inner, BaseModel):
+            found |= figure_types(inner, f"{prefix}{name}.")
+        elif _is_number(inner):
+            found[prefix + name] = float if float in (get_args(inner) or (inner,)) else int
+    return found
+
+
+def figure(report: MethodReport, name: str) -> float | None:
+    """A figure by its dotted name; None when it was not measured."""
+    value: float | None = operator.attrgetter(name)(report)
+    return value
 
 
 def _is_number(annotation: object) -> bool:

@@ -67,7 +67,7 @@ class RunSettings:
         profile: name of the method's parameters.
         pose_feedback: see `ClosedLoop`.
         renderer: of `RENDERERS`.
-        threads: of the renderer.
+        threads: that a run uses: one for the methods, the others render ahead; with 1 all is done by one thread.
         video: whether `video.mp4` is written.
         rtabmap: parameters of RTAB-Map, None with another SLAM back end.
     """
@@ -176,7 +176,7 @@ def run_source(source: Source, settings: RunSettings, out: Path, advance: Callab
 
     Args:
         source: a simulated scenario or a recorded folder.
-        settings: how it is run; renderer and threads are the source's business.
+        settings: how it is run; the renderer is the source's business.
         out: a new or empty folder.
         advance: called after every frame.
 
@@ -184,7 +184,8 @@ def run_source(source: Source, settings: RunSettings, out: Path, advance: Callab
         ScenarioError, SimError, DotmaskError: bad input; nothing is left in `out`.
     """
     segmenter = _segmenter(source, settings)
-    with RunFolder(out) as folder, one_opencv_thread(), ThreadPoolExecutor(len(settings.methods)) as pool:
+    at_once = 1 if settings.threads == 1 else len(settings.methods)
+    with RunFolder(out) as folder, one_opencv_thread(), ThreadPoolExecutor(at_once) as pool:
         source.describe(folder)
         loops: dict[str, ClosedLoop] = {}
         judges = {name: Judge(name) for name in settings.methods}

@@ -24,20 +24,29 @@ class Timed(Generic[F]):
     seconds: float
 
 
-def made_ahead(make: Callable[[int], F], indices: range) -> Iterator[Timed[F]]:
-    """What `make` gives for each index, in order, made by a second thread a few frames ahead of the consumer."""
+def made_ahead(make: Callable[[int], F], indices: range, frames_ahead: int = FRAMES_AHEAD) -> Iterator[Timed[F]]:
+    """What `make` gives for each index, in order, made by a second thread a few frames ahead of the consumer.
+
+    Args:
+        make: a frame by its index.
+        indices: which.
+        frames_ahead: how many; with 0 each is made when it is asked for, and there is no second thread.
+    """
 
     def timed(index: int) -> Timed[F]:
         start = time.perf_counter()
         frame = make(index)
         return Timed(frame=frame, seconds=time.perf_counter() - start)
 
+    if frames_ahead == 0:
+        yield from map(timed, indices)
+        return
     pending: deque[Future[Timed[F]]] = deque()
     with ThreadPoolExecutor(max_workers=1, thread_name_prefix="frames") as pool:
         try:
             for index in indices:
                 pending.append(pool.submit(timed, index))
-                if len(pending) > FRAMES_AHEAD:
+                if len(pending) > frames_ahead:
                     yield pending.popleft().result()
             while pending:
                 yield pending.popleft().result()

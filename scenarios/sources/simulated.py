@@ -8,7 +8,7 @@ from scenarios.bridge import rgbd_frame_from_sim
 from scenarios.faults.chain import Faults
 from scenarios.oracle import OracleSegmenter
 from scenarios.run_folder import RunFolder
-from scenarios.sources.ahead import Timed, made_ahead
+from scenarios.sources.ahead import FRAMES_AHEAD, Timed, made_ahead
 from scenarios.sources.source import SourceFrame
 from scenarios.spec import Scenario
 from scenarios.world import build_simulator
@@ -24,7 +24,7 @@ class Simulated:
     Args:
         scenario: what happens.
         renderer: name of the renderer.
-        threads: of the renderer.
+        threads: that the run uses: one is left to the methods; with 1 nothing is rendered ahead either.
     """
 
     def __init__(self, scenario: Scenario, renderer: str, threads: int) -> None:
@@ -38,7 +38,7 @@ class Simulated:
     @cached_property
     def _simulator(self) -> Simulator:
         assert self.renderer is not None
-        return build_simulator(self._scenario, self.renderer, self._threads)
+        return build_simulator(self._scenario, self.renderer, max(self._threads - 1, 1))
 
     def __len__(self) -> int:
         """Number of frames."""
@@ -56,7 +56,7 @@ class Simulated:
             frame = simulator.frame(index)
             return SourceFrame(frame=rgbd_frame_from_sim(frame), truth=frame.truth)
 
-        return made_ahead(make, range(len(self)))
+        return made_ahead(make, range(len(self)), 0 if self._threads == 1 else FRAMES_AHEAD)
 
     def static_world(self) -> "StaticWorld":
         """The scene without all that can move."""

@@ -4,10 +4,10 @@ import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from scenarios.finished_runs import FinishedRuns, run_key
 from scenarios.report import MethodReport, Report
 from scenarios.run import method_of, run
 from scenarios.tables.plan import TablePlan
-from scenarios.tables.store import ReportStore, run_key
 
 Reports = Mapping[str, tuple[Report, ...]]
 """By sequence, the reports of its repeats."""
@@ -25,16 +25,16 @@ def measure(plan: TablePlan, out: Path, show: Callable[[str], None], advance: Ca
     Raises:
         ScenarioError, SimError, DotmaskError: bad settings, or `out` cannot be written to.
     """
-    store = ReportStore(out)
+    finished = FinishedRuns(out, Report)
     reports: dict[str, tuple[Report, ...]] = {}
     for scenario in plan.scenarios():
-        key = run_key(plan, scenario)
-        report = store.load(key)
+        key = run_key(scenario, plan.settings)
+        report = finished.load(key)
         if report is None:
             show(scenario.name)
             with tempfile.TemporaryDirectory(prefix="dotmask-tables-") as folder:
                 report = run(scenario, plan.settings, Path(folder) / "run", lambda: advance(1))
-            store.save(key, report)
+            finished.save(key, report)
         else:
             advance(scenario.frames)
         reports[scenario.name] = split_repeats(report)

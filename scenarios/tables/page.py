@@ -4,6 +4,7 @@ from pathlib import Path
 
 from dotmask.atomic_file import write_atomically
 from scenarios.errors import ScenarioError
+from scenarios.finished_runs import figure_settings
 from scenarios.run_folder import versions
 from scenarios.tables.layout import ate_table, loop_table, map_table, odometry_table, paper_time_table, time_table
 from scenarios.tables.measure import Reports
@@ -49,8 +50,8 @@ def section_text(plan: TablePlan, reports: Reports) -> str:
         reports: what came of it.
     """
     times = "once" if plan.repeats == 1 else f"{plan.repeats} times"
-    settings = plan.figure_settings()
-    del settings["methods"], settings["rtabmap"]
+    settings = figure_settings(plan.settings)
+    del settings["methods"], settings["with_map"], settings["rtabmap"]
     stated = ", ".join(f"{name.replace('_', ' ')} `{value}`" for name, value in settings.items())
     if plan.settings.rtabmap is not None:
         changed = ", ".join(f"`{name}={value}`" for name, value in plan.settings.rtabmap.parameters.items())

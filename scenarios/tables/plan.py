@@ -1,8 +1,7 @@
 """What is run for the tables: the paper's six sequences, all methods, the back end as often as it needs."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 from scenarios.registry import scenario
 from scenarios.run import METHODS as RUN_METHODS
@@ -19,9 +18,6 @@ REPEATS = {"rtabmap": 5}
 
 METHODS = {"rtabmap": ("unmasked", "dotmask")}
 """Methods by SLAM back end; all where it is not named. RTAB-Map takes long, and `mdi` is not in the paper's tables."""
-
-NO_INFLUENCE = ("threads", "video", "with_map")
-"""Settings that change no figure but times."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,7 +88,3 @@ class TablePlan:
     def total_frames(self) -> int:
         """Frames of all runs."""
         return sum(one.frames for one in self.scenarios())
-
-    def figure_settings(self) -> dict[str, Any]:
-        """The settings that decide the figures, by name."""
-        return {name: value for name, value in asdict(self.settings).items() if name not in NO_INFLUENCE}

@@ -25,8 +25,9 @@ class Spread:
     def text(self, digits: int) -> str:
         """The median, with the range after it where runs differ, and how many have no figure where some have none."""
         shown = f"{self.median:.{digits}f}"
-        if self.runs > 1:
-            shown += f" ({self.low:.{digits}f} to {self.high:.{digits}f})"
+        low, high = f"{self.low:.{digits}f}", f"{self.high:.{digits}f}"
+        if low != high:
+            shown += f" ({low} to {high})"
         if self.measured < self.runs:
             shown += f" [{self.measured} of {self.runs} runs]"
         return shown

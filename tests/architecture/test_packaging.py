@@ -20,6 +20,8 @@ HEAVY = (
     "numpy",
     "matplotlib",
     "skimage",
+    "pyarrow",
+    "ray",
 )
 
 
@@ -36,7 +38,7 @@ def test_a_foreign_sim_is_named(tmp_path: Path) -> None:
     assert "another package named 'sim' hides ours" in done.stderr
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"], ["attribute", "--help"]])
+@pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"], ["attribute", "--help"], ["sweep", "--help"]])
 def test_help_loads_nothing_heavy(arguments: list[str]) -> None:
     code = (
         "import sys\nfrom scenarios import cli\n"

@@ -6,12 +6,13 @@ from pathlib import Path
 
 import pytest
 
+from scenarios import finished_runs
 from scenarios.errors import ScenarioError
 from scenarios.registry import SCENARIOS
 from scenarios.report import LoopReport, MapReport, MethodReport, Report, StageTimes, WorldTimes
 from scenarios.run import METHODS, RunSettings, method_of
 from scenarios.tables import measure as measuring
-from scenarios.tables import page, store
+from scenarios.tables import page
 from scenarios.tables import plan as plan_module
 from scenarios.tables.layout import (
     ate_table,
@@ -157,9 +158,9 @@ def test_other_settings_versions_code_or_frames_are_other_runs(tmp_path: Path, r
     assert len(runs) == 1, "the number of threads changes no figure"
     measured(replace(plan, settings=replace(SETTINGS, profile="paper")), tmp_path)
     measured(replace(plan, frames=8), tmp_path)
-    monkeypatch.setattr(store, "versions", lambda: {"numpy": "99"})
+    monkeypatch.setattr(finished_runs, "versions", lambda: {"numpy": "99"})
     measured(plan, tmp_path)
-    monkeypatch.setattr(store, "code_hash", lambda: "other")
+    monkeypatch.setattr(finished_runs, "code_hash", lambda: "other")
     measured(plan, tmp_path)
     assert len(runs) == 5
     monkeypatch.undo()
