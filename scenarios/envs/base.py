@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 import gymnasium
 import numpy as np
@@ -70,7 +70,7 @@ class ScenarioEnv(gymnasium.Env[Observation, Action], Generic[Action]):
         ScenarioError: what is asked for does not exist.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 30}
+    metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 30}  # noqa: RUF012 (as Gymnasium declares it)
 
     def __init__(
         self,
@@ -94,7 +94,7 @@ class ScenarioEnv(gymnasium.Env[Observation, Action], Generic[Action]):
         if lost_frames < 1:
             raise ScenarioError(f"lost_frames: expected 1 or more, got {lost_frames}")
         self.render_mode = render_mode
-        self.metadata = {**self.metadata, "render_fps": self.scenario.frame_rate_hz}  # type: ignore[misc]
+        self.metadata = {**self.metadata, "render_fps": self.scenario.frame_rate_hz}
         self.intrinsics: Intrinsics = intrinsics_from_camera(camera_model(self.scenario.camera))
         self.weights = weights or RewardWeights()
         self._vary_seed, self._lost_frames = vary_seed, lost_frames
@@ -149,7 +149,7 @@ class ScenarioEnv(gymnasium.Env[Observation, Action], Generic[Action]):
         is_lost = self._pose_error.lost_frames >= self._lost_frames
         return observation, sum(terms.values()), is_lost, is_last, info
 
-    def render(self) -> Picture | None:  # type: ignore[override]
+    def render(self) -> Picture | None:
         """Colour, depth, masks and trajectory side by side (H, 4 W, 3) in the mode `rgb_array`, else None."""
         return self._picture() if self.render_mode == "rgb_array" else None
 

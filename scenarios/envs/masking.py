@@ -50,7 +50,7 @@ class GivenMasks:
         return self._result
 
 
-class Masking(ScenarioEnv[Masks]):
+class Masking(ScenarioEnv[Any]):
     """See a frame, answer with what to hide: the camera goes the scenario's own way, SLAM is fed the rest.
 
     The action is a mask (H, W), 1 = hidden from odometry and from the map; with `map_mask` it is a Dict of two masks,
@@ -128,4 +128,4 @@ class Masking(ScenarioEnv[Masks]):
         given = np.asarray(mask)
         if given.shape != self._size:
             raise ScenarioError(f"masking: a mask has the size of the image, {self._size}; got {given.shape}")
-        return given != 0
+        return np.asarray(given != 0)
