@@ -86,7 +86,8 @@ class StageClock:
 
 
 def _cpu_elsewhere_s(part: object) -> float:
-    return part.cpu_elsewhere_s if isinstance(part, WorksElsewhere) else 0.0
+    # Asking whether None is such a part would cost more than some stages do.
+    return part.cpu_elsewhere_s if part is not None and isinstance(part, WorksElsewhere) else 0.0
 
 
 class Unmasked:

@@ -191,6 +191,24 @@ def frame_picture(result: FrameResult, paths: PathsPanel) -> Picture:
     )
 
 
+def hidden_panel(result: FrameResult) -> Picture:
+    """The colour image in grey; red: hidden from odometry, green: hidden from the map alone."""
+    masked, depth_m = result.front_end.masked, result.frame.depth_m
+    image = cv2.cvtColor(cv2.cvtColor(result.frame.rgb, cv2.COLOR_RGB2GRAY), cv2.COLOR_GRAY2RGB)
+    from_odometry = (depth_m > 0) & (masked.mo_mdi_m == 0)
+    from_map = (depth_m > 0) & (masked.mdi_m == 0) & ~from_odometry
+    for hidden, colour in ((from_map, IDLE), (from_odometry, MOVING)):
+        image[hidden] = (0.4 * image[hidden] + 0.6 * np.array(colour)).astype(np.uint8)
+    return np.asarray(image, np.uint8)
+
+
+def side_by_side(panels: list[tuple[str, Picture]]) -> Picture:
+    """Titled panels of one height in a row."""
+    for title, panel in panels:
+        _label(panel, title, (12, panel.shape[0] - 12))
+    return np.hstack([panel for _, panel in panels])
+
+
 def truth_picture(frame: SimFrame, actors: Collection[int]) -> Picture:
     """Colour, measured depth and true masks of one frame side by side; whoever moves has a red outline.
 
@@ -198,14 +216,13 @@ def truth_picture(frame: SimFrame, actors: Collection[int]) -> Picture:
         frame: to show.
         actors: instance ids of what can move: shown in bright colours, the rest in dull ones.
     """
-    panels = [
-        ("colour", frame.rgb.copy()),
-        ("depth", depth_panel(frame.depth_m)),
-        ("masks", _masks_panel(frame, actors)),
-    ]
-    for title, panel in panels:
-        _label(panel, title, (12, panel.shape[0] - 12))
-    return np.hstack([panel for _, panel in panels])
+    return side_by_side(
+        [
+            ("colour", frame.rgb.copy()),
+            ("depth", depth_panel(frame.depth_m)),
+            ("masks", _masks_panel(frame, actors)),
+        ]
+    )
 
 
 def _masks_panel(frame: SimFrame, actors: Collection[int]) -> Picture:

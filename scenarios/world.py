@@ -9,6 +9,7 @@ from scenarios.cast import build_cast
 from scenarios.errors import unknown
 from scenarios.props import build_props
 from scenarios.spec import Scenario, SensorSpec
+from sim.camera_paths.driven import DrivenPath
 from sim.records import CameraModel
 from sim.renderers.visibility_buffer import VisibilityBufferRenderer
 from sim.rooms.bare import build_bare
@@ -51,13 +52,16 @@ ROOMS: Mapping[str, Callable[[int], Room]] = MappingProxyType(
 )
 
 
-def build_simulator(scenario: Scenario, renderer: str, threads: int) -> Simulator:
+def build_simulator(
+    scenario: Scenario, renderer: str, threads: int, driven_path: DrivenPath | None = None
+) -> Simulator:
     """The simulator of `scenario`.
 
     Args:
         scenario: what happens.
         renderer: a key of RENDERERS.
         threads: of the renderer; the bytes do not depend on it.
+        driven_path: where the camera is, in place of the scenario's own path.
 
     Raises:
         ScenarioError: no such renderer, character or outfit.
@@ -65,7 +69,7 @@ def build_simulator(scenario: Scenario, renderer: str, threads: int) -> Simulato
     """
     if renderer not in RENDERERS:
         raise unknown("renderer", renderer, RENDERERS)
-    path = camera_path(scenario)
+    path = camera_path(scenario) if driven_path is None else driven_path
     scene = build_scene(scenario)
     camera = camera_model(scenario.camera)
     return Simulator(

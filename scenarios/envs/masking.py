@@ -1,0 +1,131 @@
+"""`DotMask/Masking-v0`: the agent is the masking front end, and is judged in the standard loop."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from gymnasium import spaces
+
+from dotmask.evaluation.masks import count_masking
+from dotmask.pipeline import FrontEndResult
+from dotmask.records import FloatArray, MaskedDepth, RgbdFrame
+from scenarios.envs.base import Info, Observation, ScenarioEnv
+from scenarios.errors import ScenarioError
+from scenarios.spec import Scenario
+
+Mask = npt.NDArray[Any]
+Masks = Mask | Mapping[str, Mask]
+
+
+class GivenMasks:
+    """A front end that hides what somebody else has chosen.
+
+    Attributes:
+        from_odometry: (H, W) bool, hidden from odometry in the next frame.
+        from_map: (H, W) bool, hidden from the map.
+    """
+
+    def __init__(self, shape: tuple[int, int]) -> None:
+        self.from_odometry = np.zeros(shape, np.bool_)
+        self.from_map = np.zeros(shape, np.bool_)
+
+    def step(self, frame: RgbdFrame, T_world_camera: FloatArray) -> FrontEndResult:
+        """See `dotmask.pipeline.FrontEnd`."""
+        zero = np.float32(0)
+        self._result = FrontEndResult(
+            detections=None,
+            observations=(),
+            tracks=(),
+            masked=MaskedDepth(
+                mo_mdi_m=np.where(self.from_odometry, zero, frame.depth_m),
+                mdi_m=np.where(self.from_map, zero, frame.depth_m),
+            ),
+            stage_seconds={},
+        )
+        return self._result
+
+    def refine(self, T_world_camera: FloatArray) -> FrontEndResult:
+        """Nothing depends on the pose."""
+        return self._result
+
+
+class Masking(ScenarioEnv[Any]):
+    """See a frame, answer with what to hide: the camera goes the scenario's own way, SLAM is fed the rest.
+
+    The action is a mask (H, W), 1 = hidden from odometry and from the map; with `map_mask` it is a Dict of two masks,
+    `odometry` and `map`. An episode has as many steps as the scenario has frames: the step answers the frame observed
+    last, and the observation after the last step is the last frame again. See docs/gym.md.
+
+    The scenario's oracle is `env.unwrapped.oracle`: it segments the observed frame, with the scenario's faults.
+
+    Args:
+        scenario: see `ScenarioEnv`.
+        overrides: see `ScenarioEnv`.
+        map_mask: whether the map gets a mask of its own.
+        **shared: see `ScenarioEnv`.
+
+    Raises:
+        ScenarioError: what is asked for does not exist.
+    """
+
+    def __init__(
+        self,
+        scenario: str | Scenario = "smoke",
+        overrides: Mapping[str, Any] | None = None,
+        *,
+        map_mask: bool = False,
+        **shared: Any,
+    ) -> None:
+        super().__init__(scenario, overrides, **shared)
+        self._size = (self.intrinsics.height, self.intrinsics.width)
+        mask = spaces.MultiBinary(self._size)
+        self._map_mask = map_mask
+        self.action_space = spaces.Dict({"odometry": mask, "map": spaces.MultiBinary(self._size)}) if map_mask else mask
+        self.observation_space = spaces.Dict(self.image_spaces())
+
+    def frame(self) -> RgbdFrame:
+        """The frame that was observed last, as the methods take it."""
+        return self._seen[0]
+
+    def _begin(self) -> tuple[Observation, Info]:
+        self._front_end = GivenMasks(self._size)
+        self._index = 0
+        self._seen = self._frame(0)
+        # The agent has no use for a pose that is predicted: the feedback does not matter.
+        self._closed_loop = self._loop(self._front_end, "previous", self._seen[1].T_world_camera)
+        return self.images(self._seen[0]), self._known()
+
+    def _advance(self, action: Masks) -> tuple[Observation, dict[str, float], bool, Info]:
+        self._front_end.from_odometry, self._front_end.from_map = self._given(action)
+        frame, truth = self._seen
+        result, error = self._run(self._closed_loop, frame, truth)
+        moving = [actor.instance_id for actor in truth.objects if actor.is_moving]
+        counts = count_masking(frame.depth_m, result.front_end.masked.mo_mdi_m, truth.instance_ids, moving)
+        waste = counts.waste or 0.0
+        terms = {"odometry_error": -error, "waste": -self.weights.waste * waste}
+        info = {
+            **self._known(),
+            "true_pose": truth.T_world_camera.copy(),
+            "leak": counts.leak or 0.0,
+            "waste": waste,
+        }
+        is_last = self._index + 1 == len(self.simulator)
+        if not is_last:
+            self._index += 1
+            self._seen = self._frame(self._index)
+        return self.images(self._seen[0]), terms, is_last, info
+
+    def _given(self, action: Masks) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
+        if self._map_mask:
+            if not isinstance(action, Mapping):
+                raise ScenarioError("masking: with map_mask the action is {'odometry': mask, 'map': mask}")
+            return self._checked(action["odometry"]), self._checked(action["map"])
+        mask = self._checked(action)
+        return mask, mask
+
+    def _checked(self, mask: Any) -> npt.NDArray[np.bool_]:
+        given = np.asarray(mask)
+        if given.shape != self._size:
+            raise ScenarioError(f"masking: a mask has the size of the image, {self._size}; got {given.shape}")
+        return np.asarray(given != 0)
