@@ -170,11 +170,12 @@ def example(name: str) -> ModuleType:
 
 
 def test_dotmask_as_an_agent_is_dotmask_in_the_loop() -> None:
-    env = made(MASKING, overrides=LIVELY, map_mask=True)
+    env = made(MASKING, overrides={"frames": 8}, map_mask=True)
     _, info = env.reset(seed=0)
     policy, poses = example("05_masking_agents.py").Method(env.unwrapped), []
     for _ in range(6):
         _, _, _, _, info = env.step(policy(info))
+        assert info["is_tracked"]
         poses.append(info["estimated_pose"])
     simulator = build_simulator(env.unwrapped.scenario, "numba", 1)
     oracle, start = OracleSegmenter(), simulator.frame(0).truth.T_world_camera
@@ -275,7 +276,7 @@ def test_a_missing_window_library_is_named(monkeypatch: pytest.MonkeyPatch) -> N
         (DRIVE, {"method": "dotmsk"}, "Did you mean dotmask"),
         (DRIVE, {"overrides": {"sensor.motion_errors": True}}, "no future"),
         (MASKING, {"overrides": {"frames": 1}}, "at least 2 frames"),
-        (MASKING, {"overrides": {"camera.widht": 3}}, "unknown key 'widht'"),
+        (MASKING, {"overrides": {"camera.breadth": 3}}, "unknown key 'breadth'"),
         (MASKING, {"renderer": "numbo"}, "Did you mean numba"),
         (MASKING, {"lost_frames": 0}, "1 or more"),
     ],
