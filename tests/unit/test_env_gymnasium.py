@@ -42,7 +42,7 @@ TINY = {
 LIVELY = {key: value for key, value in TINY.items() if key not in ("room", "people.cast", "things")}
 """The office of `smoke` with its people."""
 FRESH = {"context": "spawn"}
-"""A process that is forked from one in which OpenCV has started threads waits for them for ever."""
+"""Processes forked from one in which environments were stepped hang: its threads are not theirs."""
 
 
 def made(env_id: str, **options: Any) -> Any:
