@@ -25,6 +25,7 @@ from scenarios.faults.chain import Faults
 from scenarios.judge import Judge
 from scenarios.oracle import OracleSegmenter
 from scenarios.plots import Scatter, draw_scatters
+from scenarios.report import MethodReport
 from scenarios.run import RunSettings, closed_loop, one_opencv_thread
 from scenarios.run_folder import RunFolder, versions
 from scenarios.sources import rendered_ahead
@@ -47,7 +48,7 @@ class VariantRun:
         self._witness = Witness()
         front_end = build_front_end(variant.true_stages, self._witness, get_profile(settings.profile))
         self._loop = closed_loop(front_end, settings, first, T_world_camera, folder / variant.name)
-        self.judge = Judge(variant.name)
+        self._judge = Judge(variant.name)
         self._meter = StepMeter()
         self.steps: list[Step] = []
 
@@ -56,9 +57,13 @@ class VariantRun:
         self._witness.show(truth, sighting)
         return self._loop.step(frame)
 
+    def report(self) -> MethodReport:
+        """All figures, after the last frame."""
+        return self._judge.report(self._loop.finish())
+
     def see(self, truth: GroundTruth, result: FrameResult, folder: RunFolder) -> None:
         """Measure what came of it and append the rows of the tables."""
-        self.judge.see(truth, result, folder)
+        self._judge.see(truth, result, folder)
         self.steps.append(self._meter.see(truth, result))
         folder.append("steps.csv", STEP_COLUMNS, (self.variant.name, *astuple(self.steps[-1])))
 
@@ -103,7 +108,7 @@ def attribute(scenario: Scenario, settings: RunSettings, out: Path, advance: Cal
                 run.see(truth, result, folder)
                 advance()
         by_name = {run.variant.name: run for run in runs}
-        reports = {name: run.judge.report() for name, run in by_name.items()}
+        reports = {name: run.report() for name, run in by_name.items()}
         figures = {name: figures_of(report) for name, report in reports.items()}
         blame = blame_stages(figures)
         ends = (BASELINE.name, ALL_TRUE.name)

@@ -152,9 +152,10 @@ def test_with_nothing_detected_a_track_lives_one_frame_longer_than_the_limit() -
 
 @pytest.mark.parametrize("leaver", ["left", "right"])
 def test_calibrated_forgets_either_after_its_limit(leaver: str) -> None:
-    frames = two_people_then_one(leaver, CALIBRATED.max_misses + 1)
+    """Both stand still, so the limit is that of idle tracks."""
+    frames = two_people_then_one(leaver, CALIBRATED.max_misses_idle + 1)
     counts = [len(result.tracks) for result in play("calibrated", frames, rate_hz=10.0)[10:]]
-    assert counts == [2] * (CALIBRATED.max_misses - 1) + [1, 1]
+    assert counts == [2] * (CALIBRATED.max_misses_idle - 1) + [1, 1]
 
 
 def test_a_nearer_detection_of_another_class_starts_nothing() -> None:
