@@ -57,10 +57,14 @@ def test_people_have_their_keypoints(tmp_path: Path, dotmask) -> None:
 def test_stopped_from_outside_it_leaves_nothing_that_looks_complete_and_is_continued(
     end: signal.Signals, tmp_path: Path, dotmask
 ) -> None:
-    arguments = ["render", "smoke", "--frames", "160", "--seed", "3", "--format", "kitti", *SMALL, "--out"]
+    arguments = ["render", "smoke", "--frames", "60", "--seed", "3", "--format", "kitti", *SMALL, "--out"]
     out, partial = tmp_path / "out", tmp_path / ".out.partial"
     process = subprocess.Popen(
-        [sys.executable, "-m", "scenarios.cli", *arguments, str(out)], stderr=subprocess.PIPE, text=True
+        [sys.executable, "-m", "scenarios.cli", *arguments, str(out)],
+        stderr=subprocess.PIPE,
+        text=True,
+        # A shell that runs the tests in the background has them ignore the interrupt, and their children with them.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     checkpoint = partial / "checkpoint.json"
     deadline = time.monotonic() + 60
