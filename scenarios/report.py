@@ -302,7 +302,7 @@ def table(report: Report) -> Table:
         f"{report.scenario}, {seed}{report.frames} frames: segmenter {report.segmenter}, "
         f"SLAM {report.slam}, profile {report.profile}"
     )
-    drawn = Table(title=title, title_justify="left", box=SIMPLE, padding=(0, 1, 0, 0), pad_edge=False)
+    drawn = Table(title=title, title_justify="left", box=SIMPLE, padding=0, pad_edge=False)
     drawn.add_column("method", no_wrap=True)
     for heading, _ in COLUMNS:
         drawn.add_column(heading, justify="right", no_wrap=True)
