@@ -19,18 +19,15 @@ from scenarios.attribution.steps import Step, StepMeter, correlate
 from scenarios.attribution.true_stages import build_front_end
 from scenarios.attribution.variants import ALL_TRUE, BASELINE, VARIANTS, Variant
 from scenarios.attribution.witness import Sighting, Witness, look
-from scenarios.bridge import rgbd_frame_from_sim
 from scenarios.errors import ScenarioError
-from scenarios.faults.chain import Faults
 from scenarios.judge import Judge
 from scenarios.oracle import OracleSegmenter
 from scenarios.plots import Scatter, draw_scatters
 from scenarios.report import MethodReport
 from scenarios.run import RunSettings, closed_loop, one_opencv_thread
 from scenarios.run_folder import RunFolder, versions
-from scenarios.sources import rendered_ahead
+from scenarios.sources import Simulated
 from scenarios.spec import Scenario
-from scenarios.world import build_simulator
 from sim.records import GroundTruth
 
 STEP_COLUMNS = ("variant", *(field.name for field in fields(Step)))
@@ -84,16 +81,17 @@ def attribute(scenario: Scenario, settings: RunSettings, out: Path, advance: Cal
     if profile is ORIGINAL:
         raise ScenarioError("attribute: the profile original is another program without these stages; choose another")
     with RunFolder(out) as folder, one_opencv_thread(), ThreadPoolExecutor(os.cpu_count()) as pool:
-        folder.write("scenario.json", scenario.to_json())
-        simulator = build_simulator(scenario, settings.renderer, settings.threads)
-        segmenter, exact = OracleSegmenter(Faults(scenario)), OracleSegmenter()
+        source = Simulated(scenario, settings.renderer, settings.threads)
+        source.describe(folder)
+        segmenter, exact = source.oracle, OracleSegmenter()
+        assert segmenter is not None, "a simulated source has one"
         runs: tuple[VariantRun, ...] = ()
         digest = hashlib.sha256()
-        for timed in rendered_ahead(simulator):
-            sim_frame, truth = timed.frame, timed.frame.truth
-            digest.update(sim_frame.rgb.tobytes())
-            digest.update(sim_frame.depth_m.tobytes())
-            frame = rgbd_frame_from_sim(sim_frame)
+        for timed in source.frames():
+            frame, truth = timed.frame.frame, timed.frame.truth
+            assert isinstance(truth, GroundTruth), "a simulated source knows all"
+            digest.update(frame.rgb.tobytes())
+            digest.update(frame.depth_m.tobytes())
             segmenter.show(frame.index, truth)
             exact.show(frame.index, truth)
             if not runs:
@@ -115,7 +113,7 @@ def attribute(scenario: Scenario, settings: RunSettings, out: Path, advance: Cal
         attribution = Attribution(
             scenario=scenario.name,
             seed=scenario.seed,
-            frames=len(simulator),
+            frames=len(source),
             renderer=settings.renderer,
             segmenter=settings.segmenter,
             slam=settings.slam,
@@ -131,7 +129,7 @@ def attribute(scenario: Scenario, settings: RunSettings, out: Path, advance: Cal
         )
         draw_scatters(
             folder.path / "error_against_leak.png",
-            f"{scenario.name}, seed {scenario.seed}, {len(simulator)} frames, profile {settings.profile}",
+            f"{scenario.name}, seed {scenario.seed}, {len(source)} frames, profile {settings.profile}",
             "leaked pixels in the frame",
             "error of the motion from the frame before, mm",
             [_panel(title, by_name[name].steps) for name, title in zip(ends, END_TITLES, strict=True)],
