@@ -73,9 +73,7 @@ class _Contender:
         return self._slam.keyframes[-1].number if isinstance(self._slam, EmbeddedSlam) else self._elsewhere()
 
     def row(self, truth: Trajectory) -> list[str]:
-        online = Trajectory(
-            timestamps_s=np.array([t for t, _ in self._poses]), T_world_camera=np.array([T for _, T in self._poses])
-        )
+        online = Trajectory.from_poses(self._poses)
         errors = [absolute_trajectory_error(truth, t) for t in (online, self._slam.finish().trajectory)]
         return [
             self.name,
@@ -86,6 +84,8 @@ class _Contender:
 
 
 def _quartiles(seconds: list[float]) -> str:
+    if not seconds:
+        return "-"  # so few frames hold no keyframe
     low, middle, high = 1e3 * np.percentile(seconds, [25, 50, 75])
     return f"{middle:.1f} ({low:.1f} to {high:.1f})"
 
@@ -114,7 +114,7 @@ def compare(frames: int) -> str:
             truth.append((frame.timestamp_s, true.T_world_camera))
             for contender in contenders:
                 contender.see(frame, masked)
-        known = Trajectory(timestamps_s=np.array([t for t, _ in truth]), T_world_camera=np.array([T for _, T in truth]))
+        known = Trajectory.from_poses(truth)
         rows = [contender.row(known) for contender in contenders]
     budget = ["budget", f"{ODOMETRY_BUDGET_MS:.0f}", f"{KEYFRAME_BUDGET_MS:.0f}", "", ""]
     return (

@@ -7,6 +7,7 @@ indexed `[v, u]` and pixel centres lie at integers.
 Arrays are kept as read-only views: no copy is made, and the caller's own array stays writable.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
 from math import isfinite
@@ -461,6 +462,15 @@ class Trajectory:
             raise ValueError("timestamps_s: not strictly increasing")
         object.__setattr__(self, "timestamps_s", times)
         object.__setattr__(self, "T_world_camera", poses)
+
+    @classmethod
+    def from_poses(cls, poses: Iterable[tuple[float, FloatArray]]) -> "Trajectory":
+        """The trajectory of stamped poses: seconds and `T_world_camera` (4, 4), in the order of time."""
+        stamped = tuple(poses)
+        return cls(
+            timestamps_s=np.array([time_s for time_s, _ in stamped], np.float64),
+            T_world_camera=np.array([T for _, T in stamped], np.float64).reshape(-1, 4, 4),
+        )
 
     def __len__(self) -> int:
         """The number of poses."""

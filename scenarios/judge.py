@@ -58,8 +58,7 @@ class Judge:
 
     def __init__(self, method: str) -> None:
         self._method = method
-        self._truth: list[tuple[float, FloatArray]] = []
-        self._true_pose_by_frame: dict[int, FloatArray] = {}
+        self._truth: dict[int, tuple[float, FloatArray]] = {}  # time and pose by frame
         self._estimate: list[tuple[float, FloatArray]] = []
         self._seconds: dict[str, list[float]] = defaultdict(list)
         self._beliefs: list[BeliefSample] = []
@@ -71,8 +70,7 @@ class Judge:
         """Score one frame, as far as its truth is known, and append its rows to `frames.csv` and `tracks.csv`."""
         frame, pose, true_pose = result.frame, result.pose.T_world_camera, truth.T_world_camera
         if true_pose is not None:
-            self._truth.append((frame.timestamp_s, true_pose))
-            self._true_pose_by_frame[frame.index] = true_pose
+            self._truth[frame.index] = frame.timestamp_s, true_pose
         if pose is not None:
             self._estimate.append((frame.timestamp_s, pose))
         for stage, seconds in result.stage_seconds.items():
@@ -164,11 +162,11 @@ class Judge:
 
     def truth_trajectory(self) -> Trajectory:
         """The true poses of all frames."""
-        return _trajectory(self._truth)
+        return Trajectory.from_poses(self._truth.values())
 
     def estimated_trajectory(self) -> Trajectory:
         """The poses that SLAM gave; frames in which it was lost are missing."""
-        return _trajectory(self._estimate)
+        return Trajectory.from_poses(self._estimate)
 
     def report(self, slam: SlamResult | None = None, of_map: MapReport | None = None) -> MethodReport:
         """All figures.
@@ -203,7 +201,7 @@ class Judge:
         )
 
     def _loop_report(self, slam: SlamResult) -> LoopReport:
-        known = self._true_pose_by_frame
+        known = {index: pose for index, (_, pose) in self._truth.items()}
         judged = [loop for loop in slam.loops if loop.from_index in known and loop.to_index in known]
         errors = loop_errors(judged, known)
         if errors is None:
@@ -307,13 +305,6 @@ def _sample(frame: int, track: Track, actor: ObjectTruth, T_world_camera: FloatA
         velocity_world=actor.velocity_world,
         ideal_world=actor.ideal_world,
         T_world_camera=T_world_camera,
-    )
-
-
-def _trajectory(poses: list[tuple[float, FloatArray]]) -> Trajectory:
-    return Trajectory(
-        timestamps_s=np.array([t for t, _ in poses], np.float64),
-        T_world_camera=np.array([p for _, p in poses], np.float64).reshape(-1, 4, 4),
     )
 
 

@@ -211,12 +211,8 @@ class RtabmapSlam:
         """
         graph = read_graph(self._worker.ask(Request(command=Command.FINISH)).payload)
         self._worker.close()
-        placed = self._placed(graph)
         return SlamResult(
-            trajectory=Trajectory(
-                timestamps_s=np.array([t for t, _ in placed], np.float64),
-                T_world_camera=np.array([T for _, T in placed], np.float64).reshape(-1, 4, 4),
-            ),
+            trajectory=Trajectory.from_poses(self._placed(graph)),
             loops=tuple(
                 LoopClosure(
                     from_index=self._tracked[later].index,
