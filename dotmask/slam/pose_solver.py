@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from dotmask.geometry import transform
+from dotmask.geometry import rotation_from_vector, transform
 from dotmask.records import FloatArray, Intrinsics
 from dotmask.slam.settings import REFERENCE_WIDTH_PX, OdometrySettings
 
@@ -225,6 +225,6 @@ class PoseSolver:
 def _rigid(rotation: FloatArray, translation: FloatArray) -> FloatArray:
     """(4, 4) of a rotation vector (3,), radians, and a translation (3,)."""
     T = np.eye(4)
-    T[:3, :3], _ = cv2.Rodrigues(rotation)
+    T[:3, :3] = rotation_from_vector(rotation)
     T[:3, 3] = translation
     return T
