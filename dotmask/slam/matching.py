@@ -109,7 +109,7 @@ def _hamming(
     words = np.ascontiguousarray(descriptors).view(np.uint64).take(chosen, axis=0)
     words ^= np.ascontiguousarray(other_descriptors).view(np.uint64).take(other_chosen, axis=0)
     a, b, c, d = np.bitwise_count(words).astype(np.int64).T
-    return a + b + c + d  # a reduction over so short an axis takes several times as long
+    return np.asarray(a + b + c + d)  # a reduction over so short an axis takes several times as long
 
 
 def _best_two(

@@ -121,7 +121,7 @@ class PoseSolver:
         )
         if not found or chosen is None or len(chosen) < s.min_inliers // 2:
             return None
-        T_camera_world = _rigid(rotation[:, 0], translation[:, 0])
+        T_camera_world = _rigid(np.asarray(rotation[:, 0], float), np.asarray(translation[:, 0], float))
         inliers = chosen[:, 0].astype(np.intp)
         for _ in range(REFINEMENTS):
             if not np.isfinite(T_camera_world).all() or len(inliers) < s.min_inliers // 2:
@@ -152,7 +152,7 @@ class PoseSolver:
         T, seen = T_camera_world, self._seen(p_world, pixels, depth_m)
         for _ in range(GAUSS_NEWTON_STEPS):
             hessian, gradient = self._linearise(T, seen).normal_equations()
-            step = -np.linalg.solve(hessian, gradient)
+            step: FloatArray = -np.linalg.solve(hessian, gradient)
             T = _rigid(step[:3], step[3:]) @ T
             if np.abs(step).max() < CONVERGED:
                 break
