@@ -9,7 +9,8 @@ from math import sqrt
 import numpy as np
 
 from sim.geometry import FloatArray
-from sim.people.limbs import between, cross, limb_frame, rotation_about, twist_angle, two_bones, unit
+from sim.people.kernels import cross, limb_frame, two_bones, unit
+from sim.people.limbs import between, rotation_about, twist_angle
 from sim.people.skeleton import Skeleton
 
 _SIDES = ("Left", "Right")

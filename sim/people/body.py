@@ -6,7 +6,6 @@ forward, a list lowers its left side, a yaw turns it to the left.
 """
 
 from dataclasses import dataclass, field
-from math import cos, radians, sin, tanh
 from typing import Self
 
 import numpy as np
@@ -14,24 +13,25 @@ import numpy.typing as npt
 
 from sim.errors import MotionError
 from sim.geometry import FloatArray
+from sim.people import kernels
 from sim.people.arms import Arms
 from sim.people.characters import Character
-from sim.people.limbs import cross, limb_frame, shortest_rotation, two_bones, unit
+from sim.people.kernels import limb_frame, toe_pitch
+from sim.people.limbs import shortest_rotation
 from sim.people.skeleton import Skeleton
 
 SIDES = ("Left", "Right")
 """Order of everything that exists twice."""
 
-TOE_BEND_RAD = radians(30.0)
-"""How far the toes bend up at most when the heel rises."""
+_LIMB_BONES = ("Arm", "ForeArm", "UpLeg", "Leg", "Foot", "ToeBase")
+"""Of a side, in the order of `sim.people.kernels`."""
 
 ROLL_RANGE_DEG = (-80.0, 45.0)
 ROLL_STEP_DEG = 0.25
 CONTACT_SOFTNESS_M = 0.001
 
-_TRUNK_SHARE = {("Hips", "LHipJoint", "RHipJoint"): 0.0, ("LowerBack",): 0.34, ("Spine",): 0.67}
-_NECK_SHARE = {("Neck",): 0.4, ("Neck1",): 0.75, ("Head",): 1.0}
-"""How far bones go with the chest, and with the head; those of one share turn alike."""
+_TRUNK_SHARE = {"Hips": 0.0, "LHipJoint": 0.0, "RHipJoint": 0.0, "LowerBack": 0.34, "Spine": 0.67}
+_NECK_SHARE = {"Neck": 0.4, "Neck1": 0.75, "Head": 1.0}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -93,18 +93,10 @@ class Posture:
     wrists: FloatArray | None = None
     held: FloatArray = field(default_factory=lambda: np.zeros(2))
 
-
-def toe_pitch(foot_pitch: float) -> float:
-    """Pitch of the toes: they stay on the floor while the heel rises, until they cannot bend further."""
-    return foot_pitch - TOE_BEND_RAD * tanh(min(foot_pitch, 0.0) / TOE_BEND_RAD)
-
-
-def rotation(yaw: float, lean: float, tilt: float) -> FloatArray:
-    """3x3: a turn by `yaw` about z, after a list about y, after a tilt about x; scalars."""
-    cz, sz, cy, sy, cx, sx = cos(yaw), sin(yaw), cos(lean), sin(lean), cos(tilt), sin(tilt)
-    first = cz * cy, cz * sy * sx - sz * cx, cz * sy * cx + sz * sx
-    second = sz * cy, sz * sy * sx + cz * cx, sz * sy * cx - cz * sx
-    return np.array((*first, *second, -sy, cy * sx, cy * cx)).reshape(3, 3)  # from nested rows it takes twice as long
+    def together(self) -> FloatArray:
+        """(`kernels.SIZE`,) all but `wrists` and `held`, as the kernels take it."""
+        parts = self.hips, self.pelvis, self.chest, self.head, self.shoulders, self.elbows, self.ankles
+        return np.concatenate([*(part.ravel() for part in parts), self.foot_yaw, self.foot_pitch])
 
 
 class Body:
@@ -122,10 +114,12 @@ class Body:
             raise MotionError(f"the skeleton cannot walk: it has no bones {missing}")
         heads = {name: skeleton.heads[i] for i, name in enumerate(skeleton.names)}
         self._bone = {name: i for i, name in enumerate(skeleton.names)}
-        self._trunk_bones, self._neck_bones = (
-            [([self._bone[name] for name in names if name in self._bone], share) for names, share in shares.items()]
-            for shares in (_TRUNK_SHARE, _NECK_SHARE)
-        )
+        self._follows = np.full(len(skeleton.names), kernels.WITH_CHEST)
+        self._shares = np.zeros(len(skeleton.names))
+        for shares, follows in ((_TRUNK_SHARE, kernels.PELVIS_TO_CHEST), (_NECK_SHARE, kernels.CHEST_TO_HEAD)):
+            for name in shares.keys() & self._bone.keys():
+                self._follows[self._bone[name]], self._shares[self._bone[name]] = follows, shares[name]
+        self._limbs = np.array([[self._bone[side + bone] for bone in _LIMB_BONES] for side in SIDES])
         self.hips_rest = heads["Hips"]
         self.hip_offset = np.array([heads[s + "UpLeg"] - heads["Hips"] for s in SIDES])
         """(2, 3) from the root bone to the hip joints."""
@@ -135,22 +129,24 @@ class Body:
         self.shin_m = np.linalg.norm(shin, axis=1)
         self.leg_m = float(np.min(self.thigh_m + self.shin_m))
         """Hip to ankle with a straight knee, of the shorter leg."""
-        self._thigh_frame = [limb_frame(v, np.array([1.0, 0.0, 0.0])).T for v in thigh]
-        self._shin_frame = [limb_frame(v, np.array([1.0, 0.0, 0.0])).T for v in shin]
+        self._thigh_frames, self._shin_frames = (
+            np.array([limb_frame(bone, np.array([1.0, 0.0, 0.0])).T for bone in bones]) for bones in (thigh, shin)
+        )
         self.arms = Arms(skeleton)
-        self._arm_down = [self._hanging(side, sign) for side, sign in zip(SIDES, (1.0, -1.0), strict=True)]
+        self._arms_down = np.array([self._hanging(side, sign) for side, sign in zip(SIDES, (1.0, -1.0), strict=True)])
         hand = ("{0}Hand", "{1}Thumb", "{0}FingerBase", "{0}HandFinger1")
-        self._hand = {
-            side: [self._bone[n] for n in (part.format(side, side[0]) for part in hand) if n in self._bone]
-            for side in SIDES
-        }
+        self._hands = np.array(
+            [
+                [self._bone[n] for n in (part.format(side, side[0]) for part in hand) if n in self._bone]
+                for side in SIDES
+            ]
+        )
         self.ankle_rest = np.array([heads[s + "Foot"] for s in SIDES])
         toes = np.array([heads[s + "ToeBase"] for s in SIDES])
         ahead = (toes - self.ankle_rest)[:, :2]
         self.foot_ahead = ahead / np.linalg.norm(ahead, axis=1, keepdims=True)
         """(2, 2) horizontal direction in which each foot points at rest."""
         self._splay = np.arctan2(self.foot_ahead[:, 0], -self.foot_ahead[:, 1])
-        self._unsplayed = [rotation(-splay, 0.0, 0.0) for splay in self._splay]
         self._roll_angles = np.radians(np.arange(ROLL_RANGE_DEG[0], ROLL_RANGE_DEG[1] + 1e-9, ROLL_STEP_DEG))
         self._roll = np.array([self._rolling(side, soles) for side in range(2)])
 
@@ -158,8 +154,7 @@ class Body:
 
     def foot_rotation(self, side: int, yaw: float, pitch: float) -> FloatArray:
         """3x3 of a foot (or its toes) that turns by `yaw` and pitches about its own cross axis."""
-        splay = self._splay[side]
-        return rotation(yaw + splay, 0.0, -pitch) @ self._unsplayed[side]
+        return np.asarray(kernels.foot_rotation(self._splay[side], yaw, pitch))
 
     def rolled_ankle(self, side: int, pitch: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Where the ankle goes when the foot rolls on the floor without sliding: forward and up, metres.
@@ -207,59 +202,40 @@ class Body:
 
     def palette(self, posture: Posture) -> FloatArray:
         """(B, 4, 4) skinning matrices from the rest frame into the root frame of `posture`."""
-        bone = self._bone
-        R = self._trunk(posture)
-        R_chest, R_pelvis = rotation(*posture.chest.tolist()), rotation(*posture.pelvis.tolist())
-        shoulders, elbows = posture.shoulders.tolist(), posture.elbows.tolist()
-        foot_yaws, foot_pitches = posture.foot_yaw.tolist(), posture.foot_pitch.tolist()
-        for side, name in enumerate(SIDES):
-            outward = 1.0 - 2.0 * side
-            upper, fore = self._arm_down[side]
-            (flexion, abduction), (elbow, inward) = shoulders[side], elbows[side]
-            yaw, pitch = foot_yaws[side], foot_pitches[side]
-            R_shoulder = R_chest @ rotation(0.0, -outward * abduction, -flexion)
-            R_elbow = R_shoulder @ rotation(-outward * inward, 0.0, -elbow)
-            R[bone[name + "Arm"]] = R_shoulder @ upper
-            R[bone[name + "ForeArm"]] = R[self._hand[name]] = R_elbow @ fore
-            if posture.wrists is not None and posture.held[side] > 0.0:
-                shoulder = posture.hips + self.skeleton.offset(R, name + "Arm")
-                hand = self._hand[name]
-                R[bone[name + "Arm"]], R[bone[name + "ForeArm"]], R[hand] = self.arms.holding(
-                    side, shoulder, posture.wrists[side], R[bone[name + "Arm"]], R_elbow @ fore, posture.held[side]
-                )
-            hip = posture.hips + R_pelvis @ self.hip_offset[side]
-            knee_yaw = 0.5 * (float(posture.pelvis[0]) + yaw)
-            R_thigh, R_shin = self._leg(side, hip, posture.ankles[side], knee_yaw)
-            R[bone[name + "UpLeg"]], R[bone[name + "Leg"]] = R_thigh, R_shin
-            R[bone[name + "Foot"]] = self.foot_rotation(side, yaw, pitch)
-            R[bone[name + "ToeBase"]] = self.foot_rotation(side, yaw, toe_pitch(pitch))
+        R = self._turned(posture)
+        if posture.wrists is not None:
+            for side, name in enumerate(SIDES):
+                if posture.held[side] > 0.0:
+                    arm, fore, hand = *self._limbs[side, : kernels.FORE_ARM + 1], self._hands[side]
+                    shoulder = posture.hips + self.skeleton.offset(R, name + "Arm")
+                    R[arm], R[fore], R[hand] = self.arms.holding(
+                        side, shoulder, posture.wrists[side], R[arm].copy(), R[fore].copy(), posture.held[side]
+                    )
         return self.skeleton.palette(R, posture.hips)
 
     def shoulders(self, posture: Posture) -> FloatArray:
         """(2, 3) the shoulder joints in the root frame."""
-        R = self._trunk(posture)
+        R = self._turned(posture)
         return np.asarray(posture.hips + np.array([self.skeleton.offset(R, side + "Arm") for side in SIDES]))
 
-    def _trunk(self, posture: Posture) -> FloatArray:
-        """(B, 3, 3) how far each bone of the trunk, neck and head has turned; the limbs' bones as the chest."""
-        R = np.empty((len(self.skeleton.names), 3, 3))
-        R[:] = rotation(*posture.chest.tolist())
-        for bones, share in self._trunk_bones:
-            R[bones] = rotation(*(posture.pelvis + share * (posture.chest - posture.pelvis)).tolist())
-        for bones, share in self._neck_bones:
-            R[bones] = rotation(*(posture.chest + share * (posture.head - posture.chest)).tolist())
-        return R
-
-    def _leg(self, side: int, hip: FloatArray, ankle: FloatArray, knee_yaw: float) -> tuple[FloatArray, FloatArray]:
-        """Rotations of thigh and shin that bring the ankle to its place: two-bone inverse kinematics, knee ahead."""
-        reach = ankle - hip
-        along = unit(reach)
-        left = unit(cross(np.array([sin(knee_yaw), -cos(knee_yaw), 0.0]), along))
-        # A posture out of reach is a fault of whoever made it; the leg is then straight and points at the ankle.
-        knee, end = two_bones(reach, float(self.thigh_m[side]), float(self.shin_m[side]), cross(along, left))
-        R_thigh = limb_frame(knee, left) @ self._thigh_frame[side]
-        R_shin = limb_frame(end - knee, left) @ self._shin_frame[side]
-        return R_thigh, R_shin
+    def _turned(self, posture: Posture) -> FloatArray:
+        """(B, 3, 3) how far each bone has turned, with the arms at their angles."""
+        return np.asarray(
+            kernels.turned_bones(
+                posture.together(),
+                self._follows,
+                self._shares,
+                self._limbs,
+                self._hands,
+                self._arms_down,
+                self.hip_offset,
+                self.thigh_m,
+                self.shin_m,
+                self._thigh_frames,
+                self._shin_frames,
+                self._splay,
+            )
+        )
 
     def _hanging(self, side: str, outward: float) -> tuple[FloatArray, FloatArray]:
         """Rotations of upper arm and forearm from rest to hanging beside the body."""

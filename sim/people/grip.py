@@ -6,7 +6,8 @@ from math import pi, radians
 import numpy as np
 
 from sim.geometry import FloatArray, pose, rotation_z
-from sim.people.body import Body, Posture, rotation
+from sim.people.body import Body, Posture
+from sim.people.kernels import rotation
 from sim.people.rows import posture_from_row, standing_row
 
 PUSH_BEHIND_AXIS_M = 0.33

@@ -1,29 +1,11 @@
-"""Rotations of limbs: frames along a limb, the shortest turn, two-bone inverse kinematics."""
+"""Rotations of limbs: about an axis, the shortest turn, part of the way between two."""
 
 from math import acos, atan2, cos, sin, sqrt
 
 import numpy as np
 
 from sim.geometry import FloatArray
-
-
-def cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Cross product of two (3,) vectors; np.cross takes ten times as long for one pair."""
-    ax, ay, az = a.tolist()
-    bx, by, bz = b.tolist()
-    return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
-
-
-def unit(a: FloatArray) -> FloatArray:
-    """(3,) of length 1."""
-    return np.asarray(a / sqrt(a @ a))
-
-
-def limb_frame(along: FloatArray, hinge: FloatArray) -> FloatArray:
-    """3x3 with columns: the limb's direction, its hinge axis near `hinge`, their cross product."""
-    x = unit(along)
-    y = unit(hinge - (hinge @ x) * x)
-    return np.array([x, y, cross(x, y)]).T
+from sim.people.kernels import cross, unit
 
 
 def rotation_about(axis: FloatArray, angle: float) -> FloatArray:
@@ -56,22 +38,3 @@ def twist_angle(turn: FloatArray, axis: FloatArray) -> float:
     vector = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
     # Half of it over the cosine of the half angle is the quaternion (v, w), up to a common factor.
     return 2.0 * atan2(float(vector @ axis), 1.0 + float(np.trace(turn)))
-
-
-def two_bones(reach: FloatArray, upper_m: float, lower_m: float, bend: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Where a limb of two bones bends to span `reach`, and where it ends.
-
-    Args:
-        reach: (3,) from its start to its wanted end.
-        upper_m: length of the first bone.
-        lower_m: length of the second bone.
-        bend: (3,) unit vector across `reach`, to which the middle joint goes.
-
-    Returns:
-        (3,) the middle joint and (3,) the end, from the start. A reach that is too long gives a straight limb.
-    """
-    length = sqrt(reach @ reach)
-    distance = min(max(length, abs(upper_m - lower_m) + 1e-6), upper_m + lower_m - 1e-9)
-    along = reach / length
-    share = (upper_m * upper_m - lower_m * lower_m + distance * distance) / (2.0 * distance)
-    return share * along + sqrt(max(upper_m * upper_m - share * share, 0.0)) * bend, distance * along

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.geometry import FloatArray
+from sim.people import kernels
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -48,14 +49,4 @@ class Skeleton:
 
         Joints neither stretch nor slip: the head of a bone moves with its parent.
         """
-        along = np.asarray(self.parents[1:])
-        steps = np.einsum("bij,bj->bi", R_body_rest[along], self.heads[1:] - self.heads[along]).tolist()
-        heads = [root_body.tolist()]  # numbers of Python: a sum of two short arrays costs more than of their elements
-        for parent, (dx, dy, dz) in zip(self.parents[1:], steps, strict=True):
-            x, y, z = heads[parent]
-            heads.append([x + dx, y + dy, z + dz])
-        matrices = np.zeros((len(self.names), 4, 4))
-        matrices[:, 3, 3] = 1.0
-        matrices[:, :3, :3] = R_body_rest
-        matrices[:, :3, 3] = np.array(heads) - np.einsum("bij,bj->bi", R_body_rest, self.heads)
-        return matrices
+        return np.asarray(kernels.forward_kinematics(np.array(self.parents), self.heads, R_body_rest, root_body))

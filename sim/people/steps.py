@@ -8,7 +8,8 @@ from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 
 from sim.geometry import FloatArray
 from sim.people import gait
-from sim.people.body import Body, rotation
+from sim.people.body import Body
+from sim.people.kernels import rotation
 from sim.people.rows import (
     ANKLES,
     ARMS,

@@ -6,8 +6,9 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim.people.body import Body, Soles, rotation
+from sim.people.body import Body, Soles
 from sim.people.characters import load_character, skin
+from sim.people.kernels import rotation
 from sim.people.script import Script
 
 

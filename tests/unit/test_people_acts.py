@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from sim.errors import MotionError
-from sim.people.body import Body, Soles, rotation
+from sim.people.body import Body, Soles
 from sim.people.characters import CHARACTERS, load_character, skin
 from sim.people.grip import PUSH_AHEAD_M, PUSH_BEHIND_AXIS_M, PUSH_HEIGHT_M, box_grip, cup_grip
+from sim.people.kernels import rotation
 from sim.people.motion import Envelope
 from sim.people.script import Script
 from sim.people.seat import Seat, place_before

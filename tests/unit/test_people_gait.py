@@ -6,7 +6,8 @@ from scipy.spatial.transform import Rotation
 
 from sim.errors import MotionError
 from sim.people import gait
-from sim.people.body import Body, Posture, Soles, rotation, toe_pitch
+from sim.people.body import Body, Posture, Soles
+from sim.people.kernels import rotation, toe_pitch
 from sim.people.reference_gait import joint_angles
 from sim.people.skeleton import Skeleton
 

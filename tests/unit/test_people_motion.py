@@ -5,8 +5,9 @@ import pytest
 
 from sim.errors import MotionError
 from sim.people import gait
-from sim.people.body import Body, Soles, rotation
+from sim.people.body import Body, Soles
 from sim.people.characters import load_character, skin
+from sim.people.kernels import rotation
 from sim.people.reference_gait import joint_angles
 from sim.people.script import Script
 from sim.people.seat import Seat
