@@ -1,4 +1,7 @@
-"""From a posture to the matrices of all bones. Compiled by numba: of arrays this small, NumPy's calls are the cost."""
+"""From a posture to the matrices of all bones. Compiled by numba: of arrays this small, NumPy's calls are the cost.
+
+Loops over elements, and not whole arrays: those take seconds to compile.
+"""
 
 # mypy: ignore-errors
 # (numba infers the types of these functions from their arguments; numpy's own annotations do not describe them)
@@ -65,16 +68,22 @@ def cross(a, b):
 @njit(**KERNEL)
 def unit(a):
     """(3,) of length 1."""
-    return a / sqrt(dot(a, a))
+    length, b = sqrt(dot(a, a)), np.empty(3)
+    for i in range(3):
+        b[i] = a[i] / length
+    return b
 
 
 @njit(**KERNEL)
 def limb_frame(along, hinge):
     """(3, 3) with columns: the limb's direction, its hinge axis near `hinge`, their cross product."""
-    x = unit(along)
-    y = unit(hinge - dot(hinge, x) * x)
-    frame = np.empty((3, 3))
-    frame[:, 0], frame[:, 1], frame[:, 2] = x, y, cross(x, y)
+    x, y = unit(along), np.empty(3)
+    for i in range(3):
+        y[i] = hinge[i] - dot(hinge, x) * x[i]
+    y = unit(y)
+    z, frame = cross(x, y), np.empty((3, 3))
+    for i in range(3):
+        frame[i, 0], frame[i, 1], frame[i, 2] = x[i], y[i], z[i]
     return frame
 
 
@@ -93,9 +102,21 @@ def two_bones(reach, upper_m, lower_m, bend):
     """
     length = sqrt(dot(reach, reach))
     distance = min(max(length, abs(upper_m - lower_m) + 1e-6), upper_m + lower_m - 1e-9)
-    along = reach / length
     share = (upper_m * upper_m - lower_m * lower_m + distance * distance) / (2.0 * distance)
-    return share * along + sqrt(max(upper_m * upper_m - share * share, 0.0)) * bend, distance * along
+    across = sqrt(max(upper_m * upper_m - share * share, 0.0))
+    middle, end = np.empty(3), np.empty(3)
+    for i in range(3):
+        middle[i] = share * (reach[i] / length) + across * bend[i]
+        end[i] = distance * (reach[i] / length)
+    return middle, end
+
+
+@njit(**KERNEL)
+def put(A, matrices, number):
+    """Store A (3, 3) as `matrices[number]`."""
+    for i in range(3):
+        for j in range(3):
+            matrices[number, i, j] = A[i, j]
 
 
 @njit(**KERNEL)
@@ -118,43 +139,45 @@ def turned_bones(
         shin_frames: (2, 3, 3) the same of the shin.
         splay: (2,) yaw of the feet at rest.
     """
-    pelvis, chest, head = posture[PELVIS:CHEST], posture[CHEST:HEAD], posture[HEAD:SHOULDERS]
-    R_pelvis, R_chest = rotation(pelvis[0], pelvis[1], pelvis[2]), rotation(chest[0], chest[1], chest[2])
-    R = np.empty((len(follows), 3, 3))
+    R_pelvis = rotation(posture[PELVIS], posture[PELVIS + 1], posture[PELVIS + 2])
+    R_chest = rotation(posture[CHEST], posture[CHEST + 1], posture[CHEST + 2])
+    R, angles = np.empty((len(follows), 3, 3)), np.empty(3)
     for bone in range(len(follows)):
         if follows[bone] == WITH_CHEST:
-            R[bone] = R_chest
+            put(R_chest, R, bone)
             continue
-        low, high = (pelvis, chest) if follows[bone] == PELVIS_TO_CHEST else (chest, head)
-        angles = low + shares[bone] * (high - low)
-        R[bone] = rotation(angles[0], angles[1], angles[2])
+        first, second = (PELVIS, CHEST) if follows[bone] == PELVIS_TO_CHEST else (CHEST, HEAD)
+        for i in range(3):
+            angles[i] = posture[first + i] + shares[bone] * (posture[second + i] - posture[first + i])
+        put(rotation(angles[0], angles[1], angles[2]), R, bone)
     for side in range(2):
         outward = 1.0 - 2.0 * side
         flexion, abduction = posture[SHOULDERS + 2 * side], posture[SHOULDERS + 2 * side + 1]
         elbow, inward = posture[ELBOWS + 2 * side], posture[ELBOWS + 2 * side + 1]
         R_shoulder = product(R_chest, rotation(0.0, -outward * abduction, -flexion))
         R_elbow = product(R_shoulder, rotation(-outward * inward, 0.0, -elbow))
-        R[limbs[side, ARM]] = product(R_shoulder, arms_down[side, 0])
+        put(product(R_shoulder, arms_down[side, 0]), R, limbs[side, ARM])
         R_fore = product(R_elbow, arms_down[side, 1])
-        R[limbs[side, FORE_ARM]] = R_fore
-        for bone in hands[side]:
-            R[bone] = R_fore
+        put(R_fore, R, limbs[side, FORE_ARM])
+        for k in range(hands.shape[1]):
+            put(R_fore, R, hands[side, k])
 
         # The leg: two-bone inverse kinematics, knee ahead. A posture out of reach is a fault of whoever made it; the
         # leg is then straight and points at the ankle.
         yaw, pitch = posture[FOOT_YAW + side], posture[FOOT_PITCH + side]
-        reach = np.empty(3)
+        reach, ahead, shin = np.empty(3), np.zeros(3), np.empty(3)
         for i in range(3):
             reach[i] = posture[ANKLES + 3 * side + i] - (posture[HIPS + i] + dot(R_pelvis[i], hip_offsets[side]))
-        along, ahead = unit(reach), np.zeros(3)
-        knee_yaw = 0.5 * (pelvis[0] + yaw)
+        along, knee_yaw = unit(reach), 0.5 * (posture[PELVIS] + yaw)
         ahead[0], ahead[1] = sin(knee_yaw), -cos(knee_yaw)
         left = unit(cross(ahead, along))
         knee, end = two_bones(reach, thigh_m[side], shin_m[side], cross(along, left))
-        R[limbs[side, THIGH]] = product(limb_frame(knee, left), thigh_frames[side])
-        R[limbs[side, SHIN]] = product(limb_frame(end - knee, left), shin_frames[side])
-        R[limbs[side, FOOT]] = foot_rotation(splay[side], yaw, pitch)
-        R[limbs[side, TOES]] = foot_rotation(splay[side], yaw, toe_pitch(pitch))
+        for i in range(3):
+            shin[i] = end[i] - knee[i]
+        put(product(limb_frame(knee, left), thigh_frames[side]), R, limbs[side, THIGH])
+        put(product(limb_frame(shin, left), shin_frames[side]), R, limbs[side, SHIN])
+        put(foot_rotation(splay[side], yaw, pitch), R, limbs[side, FOOT])
+        put(foot_rotation(splay[side], yaw, toe_pitch(pitch)), R, limbs[side, TOES])
     return R
 
 
@@ -168,16 +191,15 @@ def foot_rotation(splay, yaw, pitch):
 def forward_kinematics(parents, heads, R_body_rest, root_body):
     """Skinning matrices (B, 4, 4) of turned bones, see `sim.people.skeleton.Skeleton.palette`."""
     matrices = np.zeros((len(parents), 4, 4))
-    places = np.empty_like(heads)
-    places[0] = root_body
+    places, step = np.empty((len(parents), 3)), np.empty(3)
     for bone in range(len(parents)):
         R, parent = R_body_rest[bone], parents[bone]
-        if bone > 0:
-            step = heads[bone] - heads[parent]
-            for i in range(3):
-                places[bone, i] = places[parent, i] + dot(R_body_rest[parent, i], step)
         for i in range(3):
-            matrices[bone, i, :3] = R[i]
+            step[i] = heads[bone, i] - heads[parent, i]
+        for i in range(3):
+            places[bone, i] = places[parent, i] + dot(R_body_rest[parent, i], step) if bone > 0 else root_body[i]
+            for j in range(3):
+                matrices[bone, i, j] = R[i, j]
             matrices[bone, i, 3] = places[bone, i] - dot(R[i], heads[bone])
         matrices[bone, 3, 3] = 1.0
     return matrices
