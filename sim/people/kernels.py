@@ -25,6 +25,18 @@ ARM, FORE_ARM, THIGH, SHIN, FOOT, TOES = 0, 1, 2, 3, 4, 5
 
 
 @njit(**KERNEL)
+def spline_at(x, c, t):
+    """(D,) value at `t`, between the first and the last of `x`, of a SciPy `PPoly` with these `x` and `c` (K, N, D)."""
+    piece = min(max(np.searchsorted(x, t, side="right") - 1, 0), len(x) - 2)
+    value, power = np.zeros(c.shape[2]), 1.0
+    for k in range(len(c) - 1, -1, -1):
+        for d in range(len(value)):
+            value[d] += c[k, piece, d] * power
+        power *= t - x[piece]
+    return value
+
+
+@njit(**KERNEL)
 def toe_pitch(foot_pitch):
     """Pitch of the toes: they stay on the floor while the heel rises, until they cannot bend further."""
     return foot_pitch - TOE_BEND_RAD * tanh(min(foot_pitch, 0.0) / TOE_BEND_RAD)

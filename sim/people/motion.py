@@ -9,6 +9,7 @@ from scipy.interpolate import CubicSpline
 
 from sim.errors import MotionError
 from sim.geometry import FloatArray, pose
+from sim.people import kernels
 from sim.people.body import Body, Posture
 from sim.people.grip import PUSH_LEAN_RAD, Grip, push_palms, push_wrists
 from sim.people.handling import ChairContact
@@ -67,7 +68,8 @@ class Stretch:
         if not isinstance(self.rows, CubicSpline):
             return self.rows
         t, end = time_s - self.start_s, self.duration_s
-        return np.asarray(self.rows(t - floor(t / end) * end if self.is_loop else min(max(t, 0.0), end)))
+        inside_s = t - floor(t / end) * end if self.is_loop else min(max(t, 0.0), end)
+        return np.asarray(kernels.spline_at(self.rows.x, self.rows.c, inside_s))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

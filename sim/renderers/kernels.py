@@ -85,6 +85,20 @@ def project(attributes, R, t, fx, fy, cx, cy, near, camera):
 
 
 @njit(**KERNEL)
+def bounds(camera):
+    """Least and greatest z, u, v of vertices (n, 6) as `project` leaves them; n at least 1."""
+    z_min = z_max = camera[0, 2]
+    u_min = u_max = camera[0, 3]
+    v_min = v_max = camera[0, 4]
+    for i in range(1, len(camera)):
+        z, u, v = camera[i, 2], camera[i, 3], camera[i, 4]
+        z_min, z_max = min(z_min, z), max(z_max, z)
+        u_min, u_max = min(u_min, u), max(u_max, u)
+        v_min, v_max = min(v_min, v), max(v_max, v)
+    return (z_min, u_min, v_min), (z_max, u_max, v_max)
+
+
+@njit(**KERNEL)
 def cross(ax, ay, az, bx, by, bz):
     """Cross product, on scalars: an array passed around in a pixel loop costs reference counts."""
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx

@@ -5,6 +5,7 @@ soft edge shows nothing.
 """
 
 from collections.abc import Callable
+from math import ceil, floor
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +15,9 @@ from sim.renderers import kernels, shading_kernels
 
 RIGID_CELL_M, SKINNED_CELL_M = 0.03, 0.045
 """Vertices of an actor in one cell of this size cast their shadow as one vertex. A rigid thing can have thin legs."""
+
+_DOWN = np.diag([1.0, -1.0, -1.0, 1.0])
+"""A light's camera at the origin: x right, y "down" is -y of the world, looks along -z."""
 
 Float32Array = npt.NDArray[np.float32]
 FaceArray = npt.NDArray[np.uint32]
@@ -49,14 +53,14 @@ def screen_box(camera: Float32Array, near: float, width: int, height: int) -> tu
     """
     if not len(camera):
         return 0, 0, 0, 0
-    z, u, v = np.ascontiguousarray(camera[:, 2:5].T)  # contiguous: a reduction over columns is many times slower
-    if z.max() < near:
+    (nearest, u_min, v_min), (farthest, u_max, v_max) = kernels.bounds(camera)
+    if farthest < near:
         return 0, 0, 0, 0
-    if z.min() < near:
+    if nearest < near:
         return 0, height, 0, width
     # A pixel to each side: rasterisation rounds in another way than `kernels.project`.
-    left, right = (min(max(int(edge), 0), width) for edge in (np.floor(u.min()) - 1, np.ceil(u.max()) + 2))
-    top, bottom = (min(max(int(edge), 0), height) for edge in (np.floor(v.min()) - 1, np.ceil(v.max()) + 2))
+    left, right = (min(max(edge, 0), width) for edge in (floor(u_min) - 1, ceil(u_max) + 2))
+    top, bottom = (min(max(edge, 0), height) for edge in (floor(v_min) - 1, ceil(v_max) + 2))
     return (top, bottom, left, right) if top < bottom and left < right else (0, 0, 0, 0)
 
 
@@ -134,7 +138,7 @@ class ShadowMaps:
             return 0, 0, 0, 0
         focal, centre = self._size * 0.5 / shading_kernels.SHADOW_TANGENT, (self._size - 1) * 0.5
         lens, near = (focal, focal, centre, centre), float(shading_kernels.SHADOW_NEAR)
-        T_world_light = np.diag([1.0, -1.0, -1.0, 1.0])  # x right, y "down" = -y of the world, looks along -z
+        T_world_light = _DOWN.copy()
         T_world_light[:3, 3] = light[:3]
         project(attributes, T_world_light, lens, near, camera)
         top, bottom, left, right = screen_box(camera, near, self._size, self._size)
