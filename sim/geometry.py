@@ -12,7 +12,7 @@ between two machines does not reach a pixel."""
 
 def on_grid(matrices: FloatArray) -> FloatArray:
     """`matrices` rounded to POSE_GRID."""
-    return np.asarray(np.round(matrices / POSE_GRID) * POSE_GRID)
+    return np.asarray(np.rint(matrices / POSE_GRID) * POSE_GRID)
 
 
 def rotation_z(angle_rad: float) -> FloatArray:

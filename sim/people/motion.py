@@ -3,6 +3,7 @@
 from bisect import bisect_right
 from dataclasses import dataclass, replace
 from math import floor
+from typing import Self
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -45,6 +46,28 @@ class ActSpan:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RowSpline:
+    """Rows over time, see `sim.people.rows`.
+
+    Attributes:
+        times_s: (N + 1,) breakpoints, from 0 on.
+        coefficients: (K, N, COLUMNS) of the polynomials between them, as SciPy's `PPoly` has them.
+    """
+
+    times_s: FloatArray
+    coefficients: FloatArray
+
+    @classmethod
+    def of(cls, spline: CubicSpline) -> Self:
+        """That of SciPy, which takes longer to evaluate than all else in a posture."""
+        return cls(times_s=spline.x, coefficients=spline.c)
+
+    def at(self, time_s: float) -> FloatArray:
+        """(COLUMNS,) inside the breakpoints."""
+        return np.asarray(kernels.spline_at(self.times_s, self.coefficients, time_s))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Stretch:
     """A piece of a motion.
 
@@ -55,21 +78,20 @@ class Stretch:
     """
 
     start_s: float
-    rows: CubicSpline | FloatArray
+    rows: RowSpline | FloatArray
     is_loop: bool = False
 
     @property
     def duration_s(self) -> float:
         """Seconds until it ends or repeats itself; 0 for a person who stays."""
-        return float(self.rows.x[-1]) if isinstance(self.rows, CubicSpline) else 0.0
+        return float(self.rows.times_s[-1]) if isinstance(self.rows, RowSpline) else 0.0
 
     def row_at(self, time_s: float) -> FloatArray:
         """(COLUMNS,) at a time since time 0 of the motion."""
-        if not isinstance(self.rows, CubicSpline):
+        if not isinstance(self.rows, RowSpline):
             return self.rows
         t, end = time_s - self.start_s, self.duration_s
-        inside_s = t - floor(t / end) * end if self.is_loop else min(max(t, 0.0), end)
-        return np.asarray(kernels.spline_at(self.rows.x, self.rows.c, inside_s))
+        return self.rows.at(t - floor(t / end) * end if self.is_loop else min(max(t, 0.0), end))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

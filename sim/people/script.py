@@ -13,7 +13,7 @@ from sim.people.body import Body
 from sim.people.grip import PUSH_AHEAD_M, PUSH_BEHIND_AXIS_M, Grip
 from sim.people.handling import ChairContact
 from sim.people.idle import Idle
-from sim.people.motion import ActSpan, Envelope, PersonMotion, Stretch
+from sim.people.motion import ActSpan, Envelope, PersonMotion, RowSpline, Stretch
 from sim.people.rows import ROOT, YAW, standing_row
 from sim.people.seat import Seat, place_before, seated_row, sitting_down_rows, standing_up_rows
 from sim.people.steps import STEP_S, Steps
@@ -134,7 +134,9 @@ class Script:
             raise MotionError("walk_loop: no act goes before it, and the person stands")
         path = WalkPath(waypoints_world, way="loop" if closed else "there_and_back")
         plan = WalkPlan(path, speed_m_s, self._body.leg_m)
-        self._stretches = [Stretch(start_s=-plan.time_of(start_m), rows=_loop_spline(plan, self._body), is_loop=True)]
+        self._stretches = [
+            Stretch(start_s=-plan.time_of(start_m), rows=RowSpline.of(_loop_spline(plan, self._body)), is_loop=True)
+        ]
         self._acts.append(ActSpan(name="walk_loop", start_s=0.0, end_s=inf))
         self._time_s = inf
 
@@ -308,7 +310,7 @@ class Script:
     def _add(self, rows: FloatArray) -> None:
         """A movement from rest to rest, one row every STEP_S."""
         spline = CubicSpline(np.arange(len(rows)) * STEP_S, rows, bc_type="clamped")
-        self._stretches.append(Stretch(start_s=self._time_s, rows=spline))
+        self._stretches.append(Stretch(start_s=self._time_s, rows=RowSpline.of(spline)))
         self._time_s += float(spline.x[-1])
 
 

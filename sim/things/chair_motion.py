@@ -4,9 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.geometry import FloatArray, pose, rotation_z
+from sim.geometry import FloatArray
 from sim.physics.keyframes import KeyframeMotion
 from sim.things.chairs import CASTER_TRAIL_M, CASTERS, caster_place
+
+_PLACES = np.array([caster_place(number) for number in range(CASTERS)])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -29,12 +31,21 @@ class ChairMotion:
 
     def palette_at(self, time_s: float) -> FloatArray:
         """(7, 4, 4): star, top, casters."""
-        T_world_base = self.base.pose_at(time_s)
-        casters = [
-            T_world_base @ _about(caster_place(k), np.interp(time_s, self.base.times_s, self.casters_rad[:, k]))
-            for k in range(CASTERS)
-        ]
-        return np.stack([T_world_base, self.top.pose_at(time_s), *casters])
+        palette = np.empty((2 + CASTERS, 4, 4))
+        palette[0], palette[1] = self.base.pose_at(time_s), self.top.pose_at(time_s)
+        palette[2:] = palette[0] @ _about(_PLACES, self._casters_at(time_s))
+        return palette
+
+    def _casters_at(self, time_s: float) -> FloatArray:
+        """(5,) radians."""
+        times = self.base.times_s
+        if len(times) == 1 or time_s <= times[0]:
+            return self.casters_rad[0]
+        if time_s >= times[-1]:
+            return self.casters_rad[-1]
+        k = int(np.searchsorted(times, time_s, side="right")) - 1
+        before, after = self.casters_rad[k], self.casters_rad[k + 1]
+        return np.asarray(before + (after - before) / (times[k + 1] - times[k]) * (time_s - times[k]))
 
 
 def chair_motion(base: KeyframeMotion, top: KeyframeMotion, casters_rad: FloatArray) -> ChairMotion:
@@ -46,7 +57,7 @@ def chair_motion(base: KeyframeMotion, top: KeyframeMotion, casters_rad: FloatAr
     """
     yaw = np.unwrap(2 * np.arctan2(base.q_world_xyzw[:, 2], base.q_world_xyzw[:, 3]))
     angles = np.tile(casters_rad, (len(yaw), 1)) + yaw[0]  # in the world
-    places = np.stack([caster_place(k)[:2] for k in range(CASTERS)])
+    places = _PLACES[:, :2]
     steps = np.diff(base.times_s)
     for k in range(len(steps)):
         c, s = np.cos(yaw[k]), np.sin(yaw[k])
@@ -59,7 +70,13 @@ def chair_motion(base: KeyframeMotion, top: KeyframeMotion, casters_rad: FloatAr
     return ChairMotion(base=base, top=top, casters_rad=angles - yaw[:, None])
 
 
-def _about(place: FloatArray, angle_rad: float) -> FloatArray:
-    """The turn (4, 4) about the upright line through `place` (3,)."""
-    R = rotation_z(angle_rad)
-    return pose(R, place - R @ place)
+def _about(places: FloatArray, angles_rad: FloatArray) -> FloatArray:
+    """The turns (N, 4, 4) about the upright lines through `places` (N, 3)."""
+    c, s = np.cos(angles_rad), np.sin(angles_rad)
+    x, y, _ = places.T
+    T = np.zeros((len(places), 4, 4))
+    T[:, 0, 0] = T[:, 1, 1] = c
+    T[:, 0, 1], T[:, 1, 0] = -s, s
+    T[:, 0, 3], T[:, 1, 3] = x - (c * x - s * y), y - (s * x + c * y)
+    T[:, 2, 2] = T[:, 3, 3] = 1.0
+    return T
