@@ -40,9 +40,9 @@ class ChairMotion:
         """(5,) radians."""
         times = self.base.times_s
         if len(times) == 1 or time_s <= times[0]:
-            return self.casters_rad[0]
+            return np.asarray(self.casters_rad[0])
         if time_s >= times[-1]:
-            return self.casters_rad[-1]
+            return np.asarray(self.casters_rad[-1])
         k = int(np.searchsorted(times, time_s, side="right")) - 1
         before, after = self.casters_rad[k], self.casters_rad[k + 1]
         return np.asarray(before + (after - before) / (times[k + 1] - times[k]) * (time_s - times[k]))
