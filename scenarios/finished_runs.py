@@ -21,7 +21,7 @@ from scenarios.run_folder import versions
 from scenarios.spec import CameraSpec, Scenario
 
 ROOT = Path(__file__).parents[1]
-NOT_MEASURED_WITH = ("scenarios/tables/", "scenarios/sweep/", "scenarios/finished_runs.py", "scenarios/cli.py")
+NOT_MEASURED_WITH = ("scenarios/tables/", "scenarios/sweep/", "scenarios/finished_runs.py", "scenarios/cli/")
 """Code that no figure depends on."""
 
 NO_INFLUENCE = ("threads", "video")
