@@ -23,9 +23,10 @@ def rotation_z(angle_rad: float) -> FloatArray:
 
 def pose(R_a_b: FloatArray, p_a: npt.ArrayLike) -> FloatArray:
     """`T_a_b` (4, 4) from its rotation (3, 3) and the origin of b in a (3,)."""
-    T_a_b = np.eye(4)
+    T_a_b = np.zeros((4, 4))
     T_a_b[:3, :3] = R_a_b
     T_a_b[:3, 3] = p_a
+    T_a_b[3, 3] = 1.0
     return T_a_b
 
 

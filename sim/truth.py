@@ -5,7 +5,7 @@ from typing import Self
 
 import cv2
 import numpy as np
-import numpy.typing as npt
+from scipy.sparse import csr_array
 
 from sim.geometry import FloatArray
 from sim.people.keypoints import keypoints_truth
@@ -32,13 +32,11 @@ class SurfaceMoments:
 
     Attributes:
         first: (B, 4) m_b; its last column sums to 1.
-        point_bones: (P, K) int64, the bones that move each sample point.
-        point_moments: (P, K, 4) what each of them multiplies.
+        of_points: (P, 4 B) the same of each sample point, bone after bone; few bones move a point.
     """
 
     first: FloatArray
-    point_bones: npt.NDArray[np.int64]
-    point_moments: FloatArray
+    of_points: csr_array
 
     @classmethod
     def of(cls, obj: SceneObject) -> Self:
@@ -88,13 +86,7 @@ class SurfaceMoments:
                 weighted = barycentric[mine, k, None] * points[face, k]
                 moments[mine] += skin[faces[face, k]][:, :, None] * weighted[:, None, :]
             start += len(faces)
-        widest = int((moments[:, :, 3] > 0).sum(axis=1).max())
-        point_bones = np.argsort(-moments[:, :, 3], axis=1, kind="stable")[:, :widest]
-        return cls(
-            first=first,
-            point_bones=point_bones,
-            point_moments=np.take_along_axis(moments, point_bones[:, :, None], axis=1),
-        )
+        return cls(first=first, of_points=csr_array(moments.reshape(SURFACE_POINTS, -1)))
 
     def centre(self, palette: FloatArray) -> FloatArray:
         """(3,) mean of the surface posed by `palette` (B, 4, 4); of a palette's rate of change, the mean's velocity."""
@@ -102,7 +94,7 @@ class SurfaceMoments:
 
     def points(self, palette: FloatArray) -> FloatArray:
         """(P, 3) the sample points posed by `palette` (B, 4, 4); of a rate of change, their velocities."""
-        return np.asarray(np.einsum("pkij,pkj->pi", palette[self.point_bones, :3, :], self.point_moments))
+        return np.asarray(self.of_points @ palette[:, :3].transpose(0, 2, 1).reshape(-1, 3))
 
 
 def object_truth(

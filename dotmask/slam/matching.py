@@ -42,9 +42,7 @@ def match_near(
     point, corner = _candidates(expected_px, features.pixels, radius_px)
     if len(point) == 0:
         return np.zeros((0, 2), np.intp)
-    words = np.ascontiguousarray(descriptors).view(np.uint64)
-    other_words = np.ascontiguousarray(features.descriptors).view(np.uint64)
-    hamming = np.bitwise_count(words[point] ^ other_words[corner]).sum(axis=1, dtype=np.int64)
+    hamming = _hamming(descriptors, point, features.descriptors, corner)
 
     # One sortable key per candidate: distance first, then the corner.
     best, second = _best_two(point, (hamming << 32) | corner, len(descriptors))
@@ -88,9 +86,7 @@ def match_within_groups(
     if len(one) == 0:
         return np.zeros((0, 2), np.intp)
     other = order[np.arange(len(one)) - np.repeat(np.cumsum(counts) - counts - ends[groups], counts)]
-    words = np.ascontiguousarray(descriptors).view(np.uint64)
-    other_words = np.ascontiguousarray(other_descriptors).view(np.uint64)
-    hamming = np.bitwise_count(words[one] ^ other_words[other]).sum(axis=1, dtype=np.int64)
+    hamming = _hamming(descriptors, one, other_descriptors, other)
 
     best, second = _best_two(one, (hamming << 32) | other, len(groups))
     back = np.argsort(other, kind="stable")
@@ -101,6 +97,19 @@ def match_within_groups(
     # Nearer than the second best of the other side: then it is the other side's best.
     mutual = distance[candidates] < ratio * (second_back[to] >> 32)
     return np.stack([candidates[mutual], to[mutual]], axis=1).astype(np.intp)
+
+
+def _hamming(
+    descriptors: Descriptors,
+    chosen: npt.NDArray[np.int64],
+    other_descriptors: Descriptors,
+    other_chosen: npt.NDArray[np.int64],
+) -> npt.NDArray[np.int64]:
+    """(P,) differing bits of P pairs of descriptors, each chosen (P,) from (N, 32) and (K, 32)."""
+    words = np.ascontiguousarray(descriptors).view(np.uint64).take(chosen, axis=0)
+    words ^= np.ascontiguousarray(other_descriptors).view(np.uint64).take(other_chosen, axis=0)
+    a, b, c, d = np.bitwise_count(words).astype(np.int64).T
+    return a + b + c + d  # a reduction over so short an axis takes several times as long
 
 
 def _best_two(
@@ -149,13 +158,16 @@ def _candidates(
     first_of_cell = np.searchsorted(cell[order], np.arange(columns * rows + 1))
 
     wanted = np.floor(expected_px / radius_px).astype(np.int64) + 1
-    wanted[:, 0] = wanted[:, 0].clip(1, columns - 2)  # a clipped window is cut to the true one below
-    wanted[:, 1] = wanted[:, 1].clip(1, rows - 2)
-    left = (wanted[:, 1:] + np.array([-1, 0, 1])) * columns + wanted[:, :1] - 1
-    start, end = first_of_cell[left].ravel(), first_of_cell[left + 3].ravel()
-    counts = end - start
-    run = np.repeat(np.arange(len(counts)), counts)
-    corner = order[np.arange(len(run)) - np.repeat(np.cumsum(counts) - counts, counts) + np.repeat(start, counts)]
-    point = run // 3
-    inside = (np.abs(expected_px[point] - pixels[corner]) <= radius_px).all(axis=1)
+    column = wanted[:, 0].clip(1, columns - 2)  # a clipped window is cut to the true one below
+    row = wanted[:, 1].clip(1, rows - 2)
+    left = (row[:, None] + np.array([-1, 0, 1])) * columns + column[:, None] - 1
+    start = first_of_cell[left]
+    counts = first_of_cell[left + 3] - start
+    ends = np.cumsum(counts)
+    corner = order[np.arange(ends[-1]) + np.repeat(start.ravel() - ends + counts.ravel(), counts.ravel())]
+    point = np.repeat(np.arange(len(expected_px)), counts.sum(axis=1))
+    (u, v), (corner_u, corner_v) = expected_px.T, pixels.T
+    is_inside = np.abs(u[point] - corner_u[corner]) <= radius_px
+    is_inside &= np.abs(v[point] - corner_v[corner]) <= radius_px
+    inside = np.flatnonzero(is_inside)
     return point[inside], corner[inside]

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial.transform import Rotation
 
 from dotmask.geometry import transform
 from dotmask.records import FloatArray, Intrinsics
@@ -44,7 +43,7 @@ class _Linearised:
     Attributes:
         residual: (3N,) pixels of the reference width, then standard deviations of depth.
         weight: (3N,) of the Huber loss.
-        J: (3N, 6) derivatives of the residuals over the twist.
+        J: (6, 3N) derivatives of the residuals over the twist.
     """
 
     residual: FloatArray
@@ -54,8 +53,8 @@ class _Linearised:
     def normal_equations(self) -> tuple[FloatArray, FloatArray]:
         """Hessian (6, 6) and gradient (6,) of the loss."""
         # einsum of two operands sums in a fixed order; a BLAS product may not, for another number of threads.
-        weighted = self.J * self.weight[:, None]
-        return np.einsum("ni,nj->ij", weighted, self.J), np.einsum("ni,n->i", weighted, self.residual)
+        weighted = self.J * self.weight
+        return np.einsum("in,jn->ij", weighted, self.J), np.einsum("in,n->i", weighted, self.residual)
 
 
 class PoseSolver:
@@ -102,9 +101,7 @@ class PoseSolver:
         )
         if not found or chosen is None or len(chosen) < s.min_inliers // 2:
             return None
-        T_camera_world = np.eye(4)
-        T_camera_world[:3, :3] = Rotation.from_rotvec(rotation[:, 0]).as_matrix()
-        T_camera_world[:3, 3] = translation[:, 0]
+        T_camera_world = _rigid(rotation[:, 0], translation[:, 0])
         inliers = chosen[:, 0].astype(np.intp)
         for _ in range(REFINEMENTS):
             if not np.isfinite(T_camera_world).all() or len(inliers) < s.min_inliers // 2:
@@ -136,7 +133,7 @@ class PoseSolver:
         for _ in range(GAUSS_NEWTON_STEPS):
             hessian, gradient = self._linearise(T, p_world, pixels, depth_m).normal_equations()
             step = -np.linalg.solve(hessian + 1e-9 * np.trace(hessian) * np.eye(6), gradient)
-            T = _increment(step) @ T
+            T = _rigid(step[:3], step[3:]) @ T
             if np.abs(step).max() < CONVERGED:
                 break
         return T
@@ -148,26 +145,24 @@ class PoseSolver:
         inverse_sigma = 1.0 / self.depth_sigma(depth_m)
         fx, fy = camera.fx / self._scale, camera.fy / self._scale
         seen_x, seen_y = (pixels[:, 0] - camera.cx) / self._scale, (pixels[:, 1] - camera.cy) / self._scale
-        zero = np.zeros_like(depth_m)
         x, y, z = transform(T_camera_world, p_world).T
         inverse_z = 1.0 / np.maximum(z, NEAREST_M)
         a, b = fx * inverse_z, fy * inverse_z
         r_u, r_v, r_z = a * x - seen_x, b * y - seen_y, (z - depth_m) * inverse_sigma
-        # Rows of the Jacobian: derivative over (w, t). Huber: weight 1 inside the threshold, threshold/|r| outside.
+        # Huber: weight 1 inside the threshold, threshold/|r| outside.
         pixel_weight = delta / np.maximum(np.hypot(r_u, r_v), delta)
         depth_weight = delta / np.maximum(np.abs(r_z), delta)
         g_u, g_v, g_z = -a * x * inverse_z, -b * y * inverse_z, inverse_sigma
-        J = np.concatenate(
-            [
-                np.stack([y * g_u, z * a - x * g_u, -y * a, a, zero, g_u], axis=1),
-                np.stack([y * g_v - z * b, -x * g_v, x * b, zero, b, g_v], axis=1),
-                np.stack([y * g_z, -x * g_z, zero, zero, zero, g_z], axis=1),
-            ]
-        )
+        J = np.zeros((6, 3, len(depth_m)))
+        J[0] = y * g_u, y * g_v - z * b, y * g_z
+        J[1] = z * a - x * g_u, -x * g_v, -x * g_z
+        J[2, 0], J[2, 1] = -y * a, x * b
+        J[3, 0], J[4, 1] = a, b
+        J[5] = g_u, g_v, g_z
         return _Linearised(
             residual=np.concatenate([r_u, r_v, r_z]),
             weight=np.concatenate([pixel_weight, pixel_weight, depth_weight]),
-            J=J,
+            J=J.reshape(6, -1),
         )
 
     def _covariance(
@@ -180,8 +175,8 @@ class PoseSolver:
         """
         at = self._linearise(T_camera_world, p_world, pixels, depth_m)
         hessian, _ = at.normal_equations()
-        gradients = (at.J * (at.weight * at.residual)[:, None]).reshape(3, -1, 6).sum(axis=0)
-        spread = np.einsum("ni,nj->ij", gradients, gradients)
+        gradients = (at.J * (at.weight * at.residual)).reshape(6, 3, -1).sum(axis=1)
+        spread = np.einsum("in,jn->ij", gradients, gradients)
         inverse_hessian = np.linalg.inv(hessian + 1e-9 * np.trace(hessian) * np.eye(6))
         # Six numbers were fitted to the residuals, which are the smaller for it.
         freedom = 3 * len(depth_m) / (3 * len(depth_m) - 6)
@@ -202,8 +197,9 @@ class PoseSolver:
         return np.flatnonzero(in_image & (np.abs(z - depth_m) < s.inlier_sigmas * self.depth_sigma(depth_m)))
 
 
-def _increment(twist: FloatArray) -> FloatArray:
+def _rigid(rotation: FloatArray, translation: FloatArray) -> FloatArray:
+    """(4, 4) of a rotation vector (3,), radians, and a translation (3,)."""
     T = np.eye(4)
-    T[:3, :3] = Rotation.from_rotvec(twist[:3]).as_matrix()
-    T[:3, 3] = twist[3:]
+    T[:3, :3], _ = cv2.Rodrigues(rotation)
+    T[:3, 3] = translation
     return T

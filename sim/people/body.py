@@ -29,8 +29,9 @@ ROLL_RANGE_DEG = (-80.0, 45.0)
 ROLL_STEP_DEG = 0.25
 CONTACT_SOFTNESS_M = 0.001
 
-_TRUNK_SHARE = {"Hips": 0.0, "LHipJoint": 0.0, "RHipJoint": 0.0, "LowerBack": 0.34, "Spine": 0.67}
-_NECK_SHARE = {"Neck": 0.4, "Neck1": 0.75, "Head": 1.0}
+_TRUNK_SHARE = {("Hips", "LHipJoint", "RHipJoint"): 0.0, ("LowerBack",): 0.34, ("Spine",): 0.67}
+_NECK_SHARE = {("Neck",): 0.4, ("Neck1",): 0.75, ("Head",): 1.0}
+"""How far bones go with the chest, and with the head; those of one share turn alike."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -101,13 +102,9 @@ def toe_pitch(foot_pitch: float) -> float:
 def rotation(yaw: float, lean: float, tilt: float) -> FloatArray:
     """3x3: a turn by `yaw` about z, after a list about y, after a tilt about x; scalars."""
     cz, sz, cy, sy, cx, sx = cos(yaw), sin(yaw), cos(lean), sin(lean), cos(tilt), sin(tilt)
-    return np.array(
-        [
-            [cz * cy, cz * sy * sx - sz * cx, cz * sy * cx + sz * sx],
-            [sz * cy, sz * sy * sx + cz * cx, sz * sy * cx - cz * sx],
-            [-sy, cy * sx, cy * cx],
-        ]
-    )
+    first = cz * cy, cz * sy * sx - sz * cx, cz * sy * cx + sz * sx
+    second = sz * cy, sz * sy * sx + cz * cx, sz * sy * cx - cz * sx
+    return np.array((*first, *second, -sy, cy * sx, cy * cx)).reshape(3, 3)  # from nested rows it takes twice as long
 
 
 class Body:
@@ -125,6 +122,10 @@ class Body:
             raise MotionError(f"the skeleton cannot walk: it has no bones {missing}")
         heads = {name: skeleton.heads[i] for i, name in enumerate(skeleton.names)}
         self._bone = {name: i for i, name in enumerate(skeleton.names)}
+        self._trunk_bones, self._neck_bones = (
+            [([self._bone[name] for name in names if name in self._bone], share) for names, share in shares.items()]
+            for shares in (_TRUNK_SHARE, _NECK_SHARE)
+        )
         self.hips_rest = heads["Hips"]
         self.hip_offset = np.array([heads[s + "UpLeg"] - heads["Hips"] for s in SIDES])
         """(2, 3) from the root bone to the hip joints."""
@@ -208,17 +209,18 @@ class Body:
         """(B, 4, 4) skinning matrices from the rest frame into the root frame of `posture`."""
         bone = self._bone
         R = self._trunk(posture)
-        R_chest, R_pelvis = rotation(*posture.chest), rotation(*posture.pelvis)
+        R_chest, R_pelvis = rotation(*posture.chest.tolist()), rotation(*posture.pelvis.tolist())
+        shoulders, elbows = posture.shoulders.tolist(), posture.elbows.tolist()
+        foot_yaws, foot_pitches = posture.foot_yaw.tolist(), posture.foot_pitch.tolist()
         for side, name in enumerate(SIDES):
             outward = 1.0 - 2.0 * side
             upper, fore = self._arm_down[side]
-            flexion, abduction = posture.shoulders[side]
-            elbow, inward = posture.elbows[side]
+            (flexion, abduction), (elbow, inward) = shoulders[side], elbows[side]
+            yaw, pitch = foot_yaws[side], foot_pitches[side]
             R_shoulder = R_chest @ rotation(0.0, -outward * abduction, -flexion)
             R_elbow = R_shoulder @ rotation(-outward * inward, 0.0, -elbow)
             R[bone[name + "Arm"]] = R_shoulder @ upper
-            R[bone[name + "ForeArm"]] = R_elbow @ fore
-            R[self._hand[name]] = R_elbow @ fore
+            R[bone[name + "ForeArm"]] = R[self._hand[name]] = R_elbow @ fore
             if posture.wrists is not None and posture.held[side] > 0.0:
                 shoulder = posture.hips + self.skeleton.offset(R, name + "Arm")
                 hand = self._hand[name]
@@ -226,10 +228,9 @@ class Body:
                     side, shoulder, posture.wrists[side], R[bone[name + "Arm"]], R_elbow @ fore, posture.held[side]
                 )
             hip = posture.hips + R_pelvis @ self.hip_offset[side]
-            knee_yaw = 0.5 * (posture.pelvis[0] + posture.foot_yaw[side])
+            knee_yaw = 0.5 * (float(posture.pelvis[0]) + yaw)
             R_thigh, R_shin = self._leg(side, hip, posture.ankles[side], knee_yaw)
             R[bone[name + "UpLeg"]], R[bone[name + "Leg"]] = R_thigh, R_shin
-            yaw, pitch = posture.foot_yaw[side], posture.foot_pitch[side]
             R[bone[name + "Foot"]] = self.foot_rotation(side, yaw, pitch)
             R[bone[name + "ToeBase"]] = self.foot_rotation(side, yaw, toe_pitch(pitch))
         return self.skeleton.palette(R, posture.hips)
@@ -242,21 +243,20 @@ class Body:
     def _trunk(self, posture: Posture) -> FloatArray:
         """(B, 3, 3) how far each bone of the trunk, neck and head has turned; the limbs' bones as the chest."""
         R = np.empty((len(self.skeleton.names), 3, 3))
-        R[:] = rotation(*posture.chest)
-        for name, share in _TRUNK_SHARE.items():
-            if name in self._bone:
-                R[self._bone[name]] = rotation(*(posture.pelvis + share * (posture.chest - posture.pelvis)))
-        for name, share in _NECK_SHARE.items():
-            if name in self._bone:
-                R[self._bone[name]] = rotation(*(posture.chest + share * (posture.head - posture.chest)))
+        R[:] = rotation(*posture.chest.tolist())
+        for bones, share in self._trunk_bones:
+            R[bones] = rotation(*(posture.pelvis + share * (posture.chest - posture.pelvis)).tolist())
+        for bones, share in self._neck_bones:
+            R[bones] = rotation(*(posture.chest + share * (posture.head - posture.chest)).tolist())
         return R
 
     def _leg(self, side: int, hip: FloatArray, ankle: FloatArray, knee_yaw: float) -> tuple[FloatArray, FloatArray]:
         """Rotations of thigh and shin that bring the ankle to its place: two-bone inverse kinematics, knee ahead."""
         reach = ankle - hip
-        left = unit(cross(np.array([sin(knee_yaw), -cos(knee_yaw), 0.0]), unit(reach)))
+        along = unit(reach)
+        left = unit(cross(np.array([sin(knee_yaw), -cos(knee_yaw), 0.0]), along))
         # A posture out of reach is a fault of whoever made it; the leg is then straight and points at the ankle.
-        knee, end = two_bones(reach, float(self.thigh_m[side]), float(self.shin_m[side]), cross(unit(reach), left))
+        knee, end = two_bones(reach, float(self.thigh_m[side]), float(self.shin_m[side]), cross(along, left))
         R_thigh = limb_frame(knee, left) @ self._thigh_frame[side]
         R_shin = limb_frame(end - knee, left) @ self._shin_frame[side]
         return R_thigh, R_shin

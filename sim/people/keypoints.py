@@ -93,12 +93,13 @@ def keypoints_truth(
     pixels[ahead, 0] = camera.fx * x[ahead] / z[ahead] + camera.cx
     pixels[ahead, 1] = camera.fy * y[ahead] / z[ahead] + camera.cy
     visibility = np.zeros(len(world), np.uint8)
-    for number in np.flatnonzero(ahead):
-        column, row = (int(c) for c in np.floor(np.clip(pixels[number], -2.0, 1e6) + 0.5))
-        if not (0 <= column < camera.width and 0 <= row < camera.height):
-            continue
-        about = np.s_[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2]
-        own = images.instance_ids[about] == instance_id
-        near = images.depth_m[about] >= z[number] - COVER_M[number]
-        visibility[number] = 2 if np.any(own & near) else 1
+    column, row = np.floor(np.clip(pixels[ahead], -2.0, 1e6) + 0.5).astype(np.int64).T
+    is_inside = (column >= 0) & (column < camera.width) & (row >= 0) & (row < camera.height)
+    inside, about = np.flatnonzero(ahead)[is_inside], np.arange(-1, 2)
+    # At the image's border a pixel stands for the one beside it that is missing.
+    rows = (row[is_inside, None] + about).clip(0, camera.height - 1)[:, :, None]
+    columns = (column[is_inside, None] + about).clip(0, camera.width - 1)[:, None, :]
+    own = images.instance_ids[rows, columns] == instance_id
+    near = images.depth_m[rows, columns] >= (z - COVER_M)[inside, None, None]
+    visibility[inside] = np.where((own & near).any(axis=(1, 2)), 2, 1)
     return KeypointsTruth(world_m=world, pixels=pixels, visibility=visibility)

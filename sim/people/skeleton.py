@@ -48,14 +48,14 @@ class Skeleton:
 
         Joints neither stretch nor slip: the head of a bone moves with its parent.
         """
-        heads = np.empty_like(self.heads)
-        heads[0] = root_body
         along = np.asarray(self.parents[1:])
-        steps = np.einsum("bij,bj->bi", R_body_rest[along], self.heads[1:] - self.heads[along])
-        for bone, parent in enumerate(self.parents[1:], 1):
-            heads[bone] = heads[parent] + steps[bone - 1]
+        steps = np.einsum("bij,bj->bi", R_body_rest[along], self.heads[1:] - self.heads[along]).tolist()
+        heads = [root_body.tolist()]  # numbers of Python: a sum of two short arrays costs more than of their elements
+        for parent, (dx, dy, dz) in zip(self.parents[1:], steps, strict=True):
+            x, y, z = heads[parent]
+            heads.append([x + dx, y + dy, z + dz])
         matrices = np.zeros((len(self.names), 4, 4))
         matrices[:, 3, 3] = 1.0
         matrices[:, :3, :3] = R_body_rest
-        matrices[:, :3, 3] = heads - np.einsum("bij,bj->bi", R_body_rest, self.heads)
+        matrices[:, :3, 3] = np.array(heads) - np.einsum("bij,bj->bi", R_body_rest, self.heads)
         return matrices
