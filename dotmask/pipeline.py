@@ -15,9 +15,9 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from dotmask.classification import Classify, classify
+from dotmask.geometry import rotation_from_vector, vector_from_rotation
 from dotmask.interfaces import Segmenter, SlamBackend, WorksElsewhere
 from dotmask.masking import all_cutouts, choose_cutouts, mask_depth
 from dotmask.profiles import PoseFeedback, Profile
@@ -361,8 +361,8 @@ def extrapolate(first: tuple[float, FloatArray], second: tuple[float, FloatArray
     """
     (t0, T_world_0), (t1, T_world_1) = first, second
     ratio = (timestamp_s - t1) / (t1 - t0)
-    turn = Rotation.from_matrix(T_world_0[:3, :3].T @ T_world_1[:3, :3]).as_rotvec()
+    turn = vector_from_rotation(T_world_0[:3, :3].T @ T_world_1[:3, :3])
     T_world_camera = np.eye(4)
-    T_world_camera[:3, :3] = T_world_1[:3, :3] @ Rotation.from_rotvec(ratio * turn).as_matrix()
+    T_world_camera[:3, :3] = T_world_1[:3, :3] @ rotation_from_vector(ratio * turn)
     T_world_camera[:3, 3] = T_world_1[:3, 3] + ratio * (T_world_1[:3, 3] - T_world_0[:3, 3])
     return T_world_camera

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from dotmask.mask_geometry import bounding_rectangle
 from dotmask.records import Detections, FloatArray, MaskImage, RgbdFrame
 from sim.records import GroundTruth
 
@@ -16,8 +17,8 @@ MIN_PIXELS = 80
 
 def outer_box(mask: MaskImage) -> FloatArray:
     """(4,) `u_min, v_min, u_max, v_max` of a mask (H, W) that has pixels: the outermost pixel centres."""
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    return np.array([columns[0], rows[0], columns[-1], rows[-1]], np.float64)
+    left, top, width, height = bounding_rectangle(mask)
+    return np.array([left, top, left + width - 1, top + height - 1], np.float64)
 
 
 def true_detections(truth: GroundTruth) -> Detections:

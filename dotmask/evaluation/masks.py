@@ -82,7 +82,7 @@ def count_masking(
     ids = sorted(set(moving_ids))
     is_moving_id = np.zeros(max(int(instance_ids.max(initial=0)), *ids, 0) + 1, dtype=np.bool_)
     is_moving_id[ids] = True
-    is_moving = is_moving_id[instance_ids]
+    is_moving = is_moving_id.take(instance_ids)
     has_depth, is_kept = depth_m > 0, mo_mdi_m > 0
     moving = int(np.count_nonzero(is_moving & has_depth))
     leaked = int(np.count_nonzero(is_moving & is_kept))

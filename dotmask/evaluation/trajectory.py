@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
+from dotmask.geometry import inverse, vector_from_rotation
 from dotmask.records import FloatArray, Trajectory
 from dotmask.timestamps import nearest_pairs
 
@@ -160,6 +161,14 @@ def relative_pose_error(
         rot_rmse_rad=_root_mean_square(Rotation.from_matrix(error[:, :3, :3]).magnitude()),
         pairs=len(start),
     )
+
+
+def step_error(
+    truth_before: FloatArray, truth: FloatArray, estimate_before: FloatArray, estimate: FloatArray
+) -> tuple[float, float]:
+    """The error of one step of `relative_pose_error`, metres and radians, from four poses `T_world_camera` (4, 4)."""
+    error = inverse(inverse(truth_before) @ truth) @ inverse(estimate_before) @ estimate
+    return float(np.linalg.norm(error[:3, 3])), float(np.linalg.norm(vector_from_rotation(error[:3, :3])))
 
 
 def _steps_in_time(

@@ -109,7 +109,7 @@ def _hamming(
     words = np.ascontiguousarray(descriptors).view(np.uint64).take(chosen, axis=0)
     words ^= np.ascontiguousarray(other_descriptors).view(np.uint64).take(other_chosen, axis=0)
     a, b, c, d = np.bitwise_count(words).astype(np.int64).T
-    return a + b + c + d  # a reduction over so short an axis takes several times as long
+    return np.asarray(a + b + c + d)  # a reduction over so short an axis takes several times as long
 
 
 def _best_two(
@@ -151,21 +151,21 @@ def _candidates(
     """
     if len(expected_px) == 0 or len(pixels) == 0:
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
-    cells = np.floor(pixels / radius_px).astype(np.int64) + 1  # cell 0 stays empty, as do the last ones
-    columns, rows = cells.max(axis=0) + 2
+    cells = np.floor(pixels / radius_px).astype(np.int64) + 2  # the first two stay empty, as do the last two
+    columns, rows = cells.max(axis=0) + 3
     cell = cells[:, 1] * columns + cells[:, 0]
     order = np.argsort(cell, kind="stable")
     first_of_cell = np.searchsorted(cell[order], np.arange(columns * rows + 1))
 
-    wanted = np.floor(expected_px / radius_px).astype(np.int64) + 1
-    column = wanted[:, 0].clip(1, columns - 2)  # a clipped window is cut to the true one below
-    row = wanted[:, 1].clip(1, rows - 2)
-    left = (row[:, None] + np.array([-1, 0, 1])) * columns + column[:, None] - 1
+    wanted = np.floor(expected_px / radius_px).astype(np.int64) + 2
+    column, row = wanted.T
+    near = np.flatnonzero((column > 0) & (column < columns - 1) & (row > 0) & (row < rows - 1))
+    left = (row[near, None] + np.array([-1, 0, 1])) * columns + column[near, None] - 1
     start = first_of_cell[left]
     counts = first_of_cell[left + 3] - start
-    ends = np.cumsum(counts)
-    corner = order[np.arange(ends[-1]) + np.repeat(start.ravel() - ends + counts.ravel(), counts.ravel())]
-    point = np.repeat(np.arange(len(expected_px)), counts.sum(axis=1))
+    ends = np.cumsum(counts).reshape(counts.shape)
+    corner = order[np.repeat(start - ends + counts, counts.ravel()) + np.arange(counts.sum())]
+    point = np.repeat(near, counts.sum(axis=1))
     (u, v), (corner_u, corner_v) = expected_px.T, pixels.T
     is_inside = np.abs(u[point] - corner_u[corner]) <= radius_px
     is_inside &= np.abs(v[point] - corner_v[corner]) <= radius_px

@@ -9,9 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial.transform import Rotation
 
-from dotmask.geometry import back_project, inverse, transform
+from dotmask.geometry import back_project, inverse, rotation_from_vector, transform, vector_from_rotation
 from dotmask.records import FloatArray, Intrinsics
 from dotmask.slam.features import Descriptors, Features
 from dotmask.slam.local_map import LocalMap
@@ -156,7 +155,7 @@ class Odometry:
         assert self._time_s is not None
         motion = self._velocity * (time_s - self._time_s)
         T_now_before = np.eye(4)
-        T_now_before[:3, :3] = Rotation.from_rotvec(motion[:3]).as_matrix()
+        T_now_before[:3, :3] = rotation_from_vector(motion[:3])
         T_now_before[:3, 3] = motion[3:]
         return np.asarray(T_now_before @ self._T_camera_world)
 
@@ -208,5 +207,4 @@ def _better(
 
 def _velocity(T_before_world: FloatArray, T_now_world: FloatArray, duration_s: float) -> FloatArray:
     T_now_before = T_now_world @ inverse(T_before_world)
-    turn = Rotation.from_matrix(T_now_before[:3, :3]).as_rotvec()
-    return np.concatenate([turn, T_now_before[:3, 3]]) / duration_s
+    return np.concatenate([vector_from_rotation(T_now_before[:3, :3]), T_now_before[:3, 3]]) / duration_s

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from dotmask.geometry import transform
+from dotmask.geometry import rotation_from_vector, transform
 from dotmask.records import FloatArray, Intrinsics
 from dotmask.slam.settings import REFERENCE_WIDTH_PX, OdometrySettings
 
@@ -37,6 +37,24 @@ class Solution:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Seen:
+    """N matched points, with what a residual needs that does not depend on the pose.
+
+    Attributes:
+        p_world: (N, 3) metres.
+        x, y: (N,) where they are seen: pixels of the reference width, from the principal point.
+        depth_m: (N,) measured.
+        inverse_sigma: (N,) of the depth, 1/m.
+    """
+
+    p_world: FloatArray
+    x: FloatArray
+    y: FloatArray
+    depth_m: FloatArray
+    inverse_sigma: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Linearised:
     """Residuals of N matches at a pose, three each: u, v, depth.
 
@@ -51,10 +69,12 @@ class _Linearised:
     J: FloatArray
 
     def normal_equations(self) -> tuple[FloatArray, FloatArray]:
-        """Hessian (6, 6) and gradient (6,) of the loss."""
+        """Hessian (6, 6) of the loss, a little damped, and its gradient (6,)."""
         # einsum of two operands sums in a fixed order; a BLAS product may not, for another number of threads.
         weighted = self.J * self.weight
-        return np.einsum("in,jn->ij", weighted, self.J), np.einsum("in,n->i", weighted, self.residual)
+        hessian, gradient = np.einsum("in,jn->ij", weighted, self.J), np.einsum("in,n->i", weighted, self.residual)
+        hessian.ravel()[::7] += 1e-9 * hessian.trace()
+        return hessian, gradient
 
 
 class PoseSolver:
@@ -101,7 +121,7 @@ class PoseSolver:
         )
         if not found or chosen is None or len(chosen) < s.min_inliers // 2:
             return None
-        T_camera_world = _rigid(rotation[:, 0], translation[:, 0])
+        T_camera_world = _rigid(np.asarray(rotation[:, 0], float), np.asarray(translation[:, 0], float))
         inliers = chosen[:, 0].astype(np.intp)
         for _ in range(REFINEMENTS):
             if not np.isfinite(T_camera_world).all() or len(inliers) < s.min_inliers // 2:
@@ -129,31 +149,36 @@ class PoseSolver:
         The increment is a twist (rotation w, translation t) from the left: with `Y = T X`, `dY = w x Y + t`. So for a
         residual with gradient g over Y, the derivative is g over t and `Y x g` over w.
         """
-        T = T_camera_world
+        T, seen = T_camera_world, self._seen(p_world, pixels, depth_m)
         for _ in range(GAUSS_NEWTON_STEPS):
-            hessian, gradient = self._linearise(T, p_world, pixels, depth_m).normal_equations()
-            step = -np.linalg.solve(hessian + 1e-9 * np.trace(hessian) * np.eye(6), gradient)
+            hessian, gradient = self._linearise(T, seen).normal_equations()
+            step: FloatArray = -np.linalg.solve(hessian, gradient)
             T = _rigid(step[:3], step[3:]) @ T
             if np.abs(step).max() < CONVERGED:
                 break
         return T
 
-    def _linearise(
-        self, T_camera_world: FloatArray, p_world: FloatArray, pixels: FloatArray, depth_m: FloatArray
-    ) -> _Linearised:
-        camera, delta = self._camera, self._settings.huber
-        inverse_sigma = 1.0 / self.depth_sigma(depth_m)
-        fx, fy = camera.fx / self._scale, camera.fy / self._scale
-        seen_x, seen_y = (pixels[:, 0] - camera.cx) / self._scale, (pixels[:, 1] - camera.cy) / self._scale
-        x, y, z = transform(T_camera_world, p_world).T
+    def _seen(self, p_world: FloatArray, pixels: FloatArray, depth_m: FloatArray) -> _Seen:
+        camera, scale = self._camera, self._scale
+        return _Seen(
+            p_world=p_world,
+            x=(pixels[:, 0] - camera.cx) / scale,
+            y=(pixels[:, 1] - camera.cy) / scale,
+            depth_m=depth_m,
+            inverse_sigma=1.0 / self.depth_sigma(depth_m),
+        )
+
+    def _linearise(self, T_camera_world: FloatArray, seen: _Seen) -> _Linearised:
+        delta = self._settings.huber
+        x, y, z = transform(T_camera_world, seen.p_world).T
         inverse_z = 1.0 / np.maximum(z, NEAREST_M)
-        a, b = fx * inverse_z, fy * inverse_z
-        r_u, r_v, r_z = a * x - seen_x, b * y - seen_y, (z - depth_m) * inverse_sigma
+        a, b = self._camera.fx / self._scale * inverse_z, self._camera.fy / self._scale * inverse_z
+        r_u, r_v, r_z = a * x - seen.x, b * y - seen.y, (z - seen.depth_m) * seen.inverse_sigma
         # Huber: weight 1 inside the threshold, threshold/|r| outside.
         pixel_weight = delta / np.maximum(np.hypot(r_u, r_v), delta)
         depth_weight = delta / np.maximum(np.abs(r_z), delta)
-        g_u, g_v, g_z = -a * x * inverse_z, -b * y * inverse_z, inverse_sigma
-        J = np.zeros((6, 3, len(depth_m)))
+        g_u, g_v, g_z = -a * x * inverse_z, -b * y * inverse_z, seen.inverse_sigma
+        J = np.zeros((6, 3, len(z)))
         J[0] = y * g_u, y * g_v - z * b, y * g_z
         J[1] = z * a - x * g_u, -x * g_v, -x * g_z
         J[2, 0], J[2, 1] = -y * a, x * b
@@ -173,11 +198,11 @@ class PoseSolver:
         `gᵢ` is the gradient of the three residuals of a match, which need not be independent. So the noise needs no
         model: it is read off the residuals.
         """
-        at = self._linearise(T_camera_world, p_world, pixels, depth_m)
+        at = self._linearise(T_camera_world, self._seen(p_world, pixels, depth_m))
         hessian, _ = at.normal_equations()
         gradients = (at.J * (at.weight * at.residual)).reshape(6, 3, -1).sum(axis=1)
         spread = np.einsum("in,jn->ij", gradients, gradients)
-        inverse_hessian = np.linalg.inv(hessian + 1e-9 * np.trace(hessian) * np.eye(6))
+        inverse_hessian = np.linalg.inv(hessian)
         # Six numbers were fitted to the residuals, which are the smaller for it.
         freedom = 3 * len(depth_m) / (3 * len(depth_m) - 6)
         covariance = freedom * inverse_hessian @ spread @ inverse_hessian
@@ -200,6 +225,6 @@ class PoseSolver:
 def _rigid(rotation: FloatArray, translation: FloatArray) -> FloatArray:
     """(4, 4) of a rotation vector (3,), radians, and a translation (3,)."""
     T = np.eye(4)
-    T[:3, :3], _ = cv2.Rodrigues(rotation)
+    T[:3, :3] = rotation_from_vector(rotation)
     T[:3, 3] = translation
     return T

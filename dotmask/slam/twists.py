@@ -1,9 +1,8 @@
 """Twists: small motions as six numbers, rotation in radians before translation in metres."""
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from dotmask.geometry import inverse
+from dotmask.geometry import inverse, rotation_from_vector, vector_from_rotation
 from dotmask.records import FloatArray
 
 
@@ -11,14 +10,14 @@ def exp(twist: FloatArray) -> FloatArray:
     """The rigid transform (4, 4) of a twist (6,)."""
     w, t = twist[:3], twist[3:]
     T = np.eye(4)
-    T[:3, :3] = Rotation.from_rotvec(w).as_matrix()
+    T[:3, :3] = rotation_from_vector(w)
     T[:3, 3] = _left_jacobian(w) @ t
     return T
 
 
 def log(T_a_b: FloatArray) -> FloatArray:
     """The twist (6,) of a rigid transform (4, 4) that turns by less than half a turn."""
-    w = Rotation.from_matrix(T_a_b[:3, :3]).as_rotvec()
+    w = vector_from_rotation(T_a_b[:3, :3])
     return np.concatenate([w, np.linalg.solve(_left_jacobian(w), T_a_b[:3, 3])])
 
 

@@ -4,11 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 from scipy.stats import pearsonr, spearmanr
 
 from dotmask.evaluation.masks import count_masking
-from dotmask.geometry import inverse
+from dotmask.evaluation.trajectory import step_error
 from dotmask.pipeline import FrameResult
 from dotmask.records import FloatArray
 from scenarios.attribution.report import Correlation
@@ -48,10 +47,7 @@ class StepMeter:
         self._before = None if pose is None else (truth.T_world_camera, pose)
         trans_error_m = rot_error_rad = None
         if before is not None and pose is not None:
-            true_step = inverse(before[0]) @ truth.T_world_camera
-            error = inverse(true_step) @ inverse(before[1]) @ pose
-            trans_error_m = float(np.linalg.norm(error[:3, 3]))
-            rot_error_rad = float(Rotation.from_matrix(error[:3, :3]).magnitude())
+            trans_error_m, rot_error_rad = step_error(before[0], truth.T_world_camera, before[1], pose)
         moving = [actor.instance_id for actor in truth.objects if actor.is_moving]
         counts = count_masking(result.frame.depth_m, result.front_end.masked.mo_mdi_m, truth.instance_ids, moving)
         return Step(

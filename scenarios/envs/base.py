@@ -199,7 +199,7 @@ class ScenarioEnv(gymnasium.Env[Observation, Action], Generic[Action]):
         if estimate is not None:
             self._estimate = estimate
         self._paths.add(truth.T_world_camera, {"estimate": result})
-        return result, self._pose_error.price(frame.timestamp_s, truth.T_world_camera, estimate, self.weights)
+        return result, self._pose_error.price(truth.T_world_camera, estimate, self.weights)
 
     def _known(self) -> Info:
         """What every info holds.

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dotmask.evaluation.trajectory import relative_pose_error
+from dotmask.evaluation.trajectory import step_error
 from dotmask.geometry import back_project, transform
-from dotmask.records import FloatArray, Intrinsics, Trajectory
+from dotmask.records import FloatArray, Intrinsics
 from sim.records import GroundTruth
 
 VOXEL_M = 0.25
@@ -44,30 +44,24 @@ class PoseError:
 
     def __init__(self) -> None:
         self.lost_frames = 0
-        self._before: tuple[float, FloatArray, FloatArray | None] | None = None
+        self._before: tuple[FloatArray, FloatArray | None] | None = None
 
-    def price(self, stamp_s: float, truth: FloatArray, estimate: FloatArray | None, weights: RewardWeights) -> float:
+    def price(self, truth: FloatArray, estimate: FloatArray | None, weights: RewardWeights) -> float:
         """Price of the step to this frame; the first frame ends no step and costs nothing.
 
         Args:
-            stamp_s: of the frame, seconds.
             truth: (4, 4) true `T_world_camera`.
             estimate: (4, 4) what SLAM says, None while it is lost.
             weights: of the errors.
         """
-        before, self._before = self._before, (stamp_s, truth, estimate)
+        before, self._before = self._before, (truth, estimate)
         self.lost_frames = self.lost_frames + 1 if estimate is None else 0
         if before is None:
             return 0.0
-        if estimate is None or before[2] is None:
+        if estimate is None or before[1] is None:
             return weights.lost
-        stamps_s = np.array([before[0], stamp_s])
-        error = relative_pose_error(
-            Trajectory(timestamps_s=stamps_s, T_world_camera=np.array([before[1], truth])),
-            Trajectory(timestamps_s=stamps_s, T_world_camera=np.array([before[2], estimate])),
-        )
-        assert error is not None
-        return weights.error_per_m * error.trans_rmse_m + weights.error_per_rad * error.rot_rmse_rad
+        trans_m, rot_rad = step_error(before[0], truth, before[1], estimate)
+        return weights.error_per_m * trans_m + weights.error_per_rad * rot_rad
 
 
 class Coverage:
@@ -79,7 +73,9 @@ class Coverage:
     """
 
     def __init__(self, intrinsics: Intrinsics, moving_ids: tuple[int, ...]) -> None:
-        self._intrinsics, self._moving_ids = intrinsics, moving_ids
+        self._intrinsics = intrinsics
+        self._is_counted = np.ones(np.iinfo(np.uint16).max + 1, np.bool_)
+        self._is_counted[list(moving_ids)] = False
         self._seen: set[int] = set()
         v, u = np.mgrid[0 : intrinsics.height : SAMPLED_EVERY_PX, 0 : intrinsics.width : SAMPLED_EVERY_PX]
         self._pixels = np.stack([u.ravel(), v.ravel()], axis=1).astype(float)
@@ -88,7 +84,7 @@ class Coverage:
         """Square metres that this frame adds: a side of each cube that is seen for the first time."""
         every = slice(None, None, SAMPLED_EVERY_PX)
         depth_m, ids = truth.depth_m[every, every].ravel(), truth.instance_ids[every, every].ravel()
-        counted = (depth_m > 0) & ~np.isin(ids, self._moving_ids)
+        counted = (depth_m > 0) & self._is_counted[ids]
         points = back_project(self._pixels[counted], depth_m[counted].astype(float), self._intrinsics)
         x, y, z = (np.floor(transform(truth.T_world_camera, points) / VOXEL_M).astype(np.int64) + 1024).T
         before = len(self._seen)

@@ -28,7 +28,7 @@ class Found:
     def by_truth(cls, detections: Detections, truth: GroundTruth) -> Self:
         """The exact detections of a frame, named by the instance that each mask shows."""
         ids = truth.instance_ids
-        return cls(detections=detections, names=tuple(str(ids[mask].flat[0]) for mask in detections.masks))
+        return cls(detections=detections, names=tuple(str(ids.flat[mask.argmax()]) for mask in detections.masks))
 
     def keep(self, which: list[bool]) -> "Found":
         """Those for which `which` is true, in the same order; this object itself if they are all."""

@@ -30,6 +30,8 @@ KERNEL = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 f32 = np.float32
 
+ROWS = 16
+"""Rows of a triangle whose ends are found together."""
 SMALL_BOX = f32(4)
 """Triangles whose box is smaller than so many pixels in width and height are drawn pixel by pixel."""
 SMALL_MARGIN = f32(0.0005)
@@ -123,11 +125,16 @@ def rasterise(
 
     Edge functions in float64 (they are differences of products), the per-pixel 1/z in float32. Writes `inverse_depth`
     (H, W) and the face's number into `triangles` (H, W), and sets `bit` in `coverage` (H, W) wherever a face lies,
-    hidden or not.
+    hidden or not. The last two may be None: a shadow map has no use for them.
     """
     inverse_fx, inverse_fy = 1.0 / fx, 1.0 / fy
     width = inverse_depth.shape[1]
-    flat_w, flat_t, flat_c = inverse_depth.ravel(), triangles.ravel(), coverage.ravel()
+    flat_w = inverse_depth.ravel()
+    if triangles is not None:  # numba leaves out what hangs on an argument that is None
+        flat_t = triangles.ravel()
+    if coverage is not None:
+        flat_c = coverage.ravel()
+    spans = np.zeros(3 * ROWS)  # by row of a triangle: first pixel, last + 1, and 1/z at the first
     near32, zero, one = f32(near), f32(0), f32(1)
     # The box that can hold a pixel centre, padded by a hundredth of a pixel: the float32 rounding of a projected vertex
     # must not cut what the edge functions would keep.
@@ -180,11 +187,12 @@ def rasterise(
                         if weight_b >= low_b and weight_g >= low_g and doubled - weight_b - weight_g >= low_a:
                             # The margins must not lead out of the range of the corners.
                             w = min(max(wa + weight_b * slope_b + weight_g * slope_g, w_low), w_high)
-                            if bit:
+                            if coverage is not None and bit:
                                 flat_c[n] |= bit
                             if w > flat_w[n]:
                                 flat_w[n] = w
-                                flat_t[n] = number
+                                if triangles is not None:
+                                    flat_t[n] = number
                         weight_b -= edge_gv
                         weight_g += edge_bv
                         n += np.uint64(1)
@@ -210,27 +218,36 @@ def rasterise(
         w_step = f32(wx * inverse_fx)
         face_number = np.int32(t)
 
-        for y in range(y_first, y_last):
-            v = (y - cy) * inverse_fy
-            low, high = narrow(rises0, inverse0, -(e0y * v + e0z) - slope0 * cx, float(x_first), float(x_last))
-            low, high = narrow(rises1, inverse1, -(e1y * v + e1z) - slope1 * cx, low, high)
-            low, high = narrow(rises2, inverse2, -(e2y * v + e2z) - slope2 * cx, low, high)
-            if crosses_near:  # 1/near - 1/z >= 0
-                slope = 0.0 - wx * inverse_fx
-                low, high = narrow(slope >= 0.0, 1.0 / slope, 1.0 / near - wy * v - wz - slope * cx, low, high)
-            if not low < high:
-                continue
-            first, last = int(np.ceil(low)), int(np.ceil(high))
-            if first >= last:
-                continue
-            w_first = f32(wx * (first - cx) * inverse_fx + wy * v + wz)
-            start = np.uint64(y * width + first)  # unsigned: no test for negative indices
-            if bit:
-                for x in range(last - first):
-                    flat_c[start + np.uint64(x)] |= bit
-            for x in range(last - first):  # select instead of branch: this loop vectorises
-                w = w_first + w_step * f32(x)
-                n = start + np.uint64(x)
-                nearer = w > flat_w[n]
-                flat_w[n] = w if nearer else flat_w[n]
-                flat_t[n] = face_number if nearer else flat_t[n]
+        slope_near, rises_near, inverse_near = 0.0, True, np.inf
+        if crosses_near:  # 1/near - 1/z >= 0
+            slope_near = 0.0 - wx * inverse_fx
+            rises_near, inverse_near = slope_near >= 0.0, 1.0 / slope_near
+        for y_block in range(y_first, y_last, ROWS):
+            # Of ROWS rows, whether the triangle has as many or not: so the loop becomes vector instructions.
+            for r in range(ROWS):
+                v = (y_block + r - cy) * inverse_fy
+                low, high = narrow(rises0, inverse0, -(e0y * v + e0z) - slope0 * cx, float(x_first), float(x_last))
+                low, high = narrow(rises1, inverse1, -(e1y * v + e1z) - slope1 * cx, low, high)
+                low, high = narrow(rises2, inverse2, -(e2y * v + e2z) - slope2 * cx, low, high)
+                if crosses_near:
+                    offset = 1.0 / near - wy * v - wz - slope_near * cx
+                    low, high = narrow(rises_near, inverse_near, offset, low, high)
+                first = np.ceil(low)
+                spans[r], spans[ROWS + r] = first, np.ceil(high)
+                spans[2 * ROWS + r] = wx * (first - cx) * inverse_fx + wy * v + wz
+            for r in range(min(ROWS, y_last - y_block)):
+                if not spans[r] < spans[ROWS + r]:  # one may be infinite
+                    continue
+                first, last = int(spans[r]), int(spans[ROWS + r])
+                w_first = f32(spans[2 * ROWS + r])
+                start = np.uint64((y_block + r) * width + first)  # unsigned: no test for negative indices
+                if coverage is not None and bit:
+                    for x in range(last - first):
+                        flat_c[start + np.uint64(x)] |= bit
+                for x in range(last - first):  # select instead of branch: this loop vectorises
+                    w = w_first + w_step * f32(x)
+                    n = start + np.uint64(x)
+                    nearer = w > flat_w[n]
+                    flat_w[n] = w if nearer else flat_w[n]
+                    if triangles is not None:
+                        flat_t[n] = face_number if nearer else flat_t[n]

@@ -102,8 +102,6 @@ class ShadowMaps:
     def __init__(self, lights: Float32Array, size: int, in_bands: Bands) -> None:
         self._lights, self._size, self._in_bands = lights, size, in_bands
         self._static = np.zeros((len(lights), size, size), np.float32)
-        self._numbers = np.zeros((size, size), np.int32)
-        self._coverage = np.zeros((size, size), np.uint32)
         self.maps = np.zeros((len(lights), size, size), np.float32)
         # The box of each map (first row, last + 1, first column, last + 1) where `maps` is not `_static`.
         self._changed = [(0, size, 0, size)] * len(lights)
@@ -152,8 +150,8 @@ class ShadowMaps:
                 min(last, bottom),
                 near,
                 target,
-                self._numbers,
-                self._coverage,
+                None,
+                None,
                 np.uint32(0),
             )
 
