@@ -2,6 +2,9 @@
 
 import sim
 
+DISTRIBUTION = "dotmask"
+"""Which distribution this package is of: its name is a common word."""
+
 if getattr(sim, "DISTRIBUTION", None) != "dotmask":
     raise ImportError(
         f"another package named 'sim' hides ours: {sim.__file__}. Uninstall it or use a clean virtual environment."

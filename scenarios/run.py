@@ -153,8 +153,8 @@ class Parts:
     Attributes:
         segmenter: in place of `RunSettings.segmenter`.
         front_end: makes what masks the depth of such a camera, in place of every one of `RunSettings.methods`.
-        slam: makes the SLAM back end from the camera and the true pose (4, 4) `T_world_camera` of the first frame, which
-            fixes the world of its estimates; in place of `RunSettings.slam`.
+        slam: makes the SLAM back end from the camera and the true pose (4, 4) `T_world_camera` of the first frame,
+            which fixes the world of its estimates; in place of `RunSettings.slam`.
     """
 
     segmenter: Segmenter | None = None

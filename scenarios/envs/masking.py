@@ -12,6 +12,7 @@ from scenarios.errors import ScenarioError
 from scenarios.given_masks import GivenMasks, Masks, checked_mask
 from scenarios.spec import Scenario
 
+
 class Masking(ScenarioEnv[Any]):
     """See a frame, answer with what to hide: the camera goes the scenario's own way, SLAM is fed the rest.
 
