@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 if TYPE_CHECKING:
-    from pytest_dotmask.kept_frames import KeptFrames
+    from pytest_dotmask.kept_frames import FrameStore
     from pytest_dotmask.runs import DotmaskRun
     from pytest_dotmask.session import DotmaskSession
     from scenarios.spec import Scenario
@@ -91,18 +91,30 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """Run a test that uses the fixtures once for every scenario and seed of its marker, the nearest one."""
     if "dotmask_scenario" not in metafunc.fixturenames:
         return
-    where = metafunc.definition.nodeid
-    mark = metafunc.definition.get_closest_marker("dotmask")
-    if mark is None:
-        pytest.fail(f"{where}: {MISSING_MARK}", pytrace=False)
     try:
-        _check_packages()
-        from pytest_dotmask.marks import chosen, seed_id
-
-        scenarios = chosen(mark)
+        scenarios, problem = _chosen(metafunc.definition), ""
     except pytest.UsageError as error:
-        pytest.fail(f"{where}: {error}", pytrace=False)
+        scenarios, problem = [], str(error)
+    if problem:  # not told above, where pytest would tell the errors behind it too
+        pytest.fail(f"{metafunc.definition.nodeid}: {problem}", pytrace=False)
+    from pytest_dotmask.marks import seed_id
+
     metafunc.parametrize("dotmask_scenario", scenarios, indirect=True, ids=map(seed_id, scenarios), scope="module")
+
+
+def _chosen(item: pytest.Item) -> list[Scenario]:
+    """The scenarios of a test.
+
+    Raises:
+        pytest.UsageError: it has no marker, or one that is not possible.
+    """
+    mark = item.get_closest_marker("dotmask")
+    if mark is None:
+        raise pytest.UsageError(MISSING_MARK)
+    _check_packages()
+    from pytest_dotmask.marks import chosen
+
+    return chosen(mark)
 
 
 @pytest.fixture(scope="module")
@@ -112,17 +124,17 @@ def dotmask_scenario(request: pytest.FixtureRequest) -> Scenario:
     return scenario
 
 
-@pytest.fixture(scope="module")
-def _dotmask_frames(dotmask_scenario: Scenario) -> KeptFrames:
-    from pytest_dotmask.kept_frames import KeptFrames
+@pytest.fixture(scope="session")
+def _dotmask_frames() -> FrameStore:
+    from pytest_dotmask.kept_frames import FrameStore
 
     # Beside other workers of pytest-xdist a second thread has no core of its own.
-    return KeptFrames(dotmask_scenario, threads=1 if "PYTEST_XDIST_WORKER" in os.environ else 2)
+    return FrameStore(threads=1 if "PYTEST_XDIST_WORKER" in os.environ else 2)
 
 
 @pytest.fixture
 def dotmask_run(
-    request: pytest.FixtureRequest, dotmask_scenario: Scenario, _dotmask_frames: KeptFrames, tmp_path: Path
+    request: pytest.FixtureRequest, dotmask_scenario: Scenario, _dotmask_frames: FrameStore, tmp_path: Path
 ) -> DotmaskRun:
     """Runs a segmenter, a masking function or a SLAM back end in the standard loop; see `pytest_dotmask.runs`."""
     from pytest_dotmask.marks import without_seed
@@ -131,7 +143,8 @@ def dotmask_run(
     recorded: list[Recorded] = []
     request.node.stash[RECORDED] = recorded
     test = without_seed(request.node.nodeid, dotmask_scenario)
-    return DotmaskRun(test, _dotmask_frames, tmp_path, recorded, request.node.user_properties)
+    frames = _dotmask_frames.frames(dotmask_scenario)
+    return DotmaskRun(test, frames, tmp_path, recorded, request.node.user_properties)
 
 
 @pytest.hookimpl(wrapper=True)

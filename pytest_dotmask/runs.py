@@ -9,7 +9,7 @@ from dotmask.interfaces import Segmenter, SlamBackend
 from dotmask.profiles import profile as get_profile
 from dotmask.records import FloatArray, Intrinsics
 from pytest_dotmask.baseline import RunFigures
-from pytest_dotmask.kept_frames import KeptFrames
+from pytest_dotmask.kept_frames import RENDERER, KeptFrames
 from pytest_dotmask.metrics import figures
 from scenarios.errors import ScenarioError, unknown
 from scenarios.given_masks import ChosenMasks, MaskChoice
@@ -91,7 +91,7 @@ class DotmaskRun:
             slam=_called(slam, "embedded"),
             profile=profile or "calibrated",
             pose_feedback=parameters.pose_feedback,
-            renderer="numba",
+            renderer=RENDERER,
             threads=self._frames.threads,
             video=False,
         )

@@ -94,6 +94,7 @@ class DotmaskSession:
             self._renew(self._path, session)
         elif self._path is not None:
             judgement = judge(self._stored, self._runs)
+            session.testscollected += len(judgement.compared)
             for compared in judgement.compared:
                 _report(session, compared, judgement.count, self._path)
             if judgement.not_run:

@@ -35,7 +35,7 @@ def message(compared: Compared, count: int, baseline: Path) -> tuple[str, str] |
         *(f"  {change.metric.name:{width}}  {change.text}, {_where(change)}" for change in worse),
         "Every seed's run folder lies in its test's tmp_path. If the change is meant: --dotmask-update-baseline",
     ]
-    return f"worse on {compared.scenario}: {gist}", "\n".join(lines)
+    return f"worse: {gist}", "\n".join(lines)
 
 
 def _where(change: Change) -> str:

@@ -1,4 +1,7 @@
-"""What is run: the only place that sees both the method and the simulator."""
+"""What is run: the only place that sees both the method and the simulator.
+
+PYTEST_DONT_REWRITE: pytest would warn of every program that imports this before it starts pytest.
+"""
 
 import sim
 
