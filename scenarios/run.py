@@ -18,7 +18,7 @@ from dotmask.original import OriginalDotMask
 from dotmask.pipeline import ClosedLoop, DotMask, FrontEnd, MaskAll, Unmasked
 from dotmask.profiles import ORIGINAL, PoseFeedback, Profile
 from dotmask.profiles import profile as get_profile
-from dotmask.records import FloatArray, RgbdFrame
+from dotmask.records import FloatArray, Intrinsics, RgbdFrame
 from dotmask.slam.embedded import EmbeddedSlam
 from dotmask.slam.rtabmap.backend import RtabmapSlam
 from dotmask.slam.rtabmap.library import core
@@ -62,8 +62,8 @@ class RunSettings:
 
     Attributes:
         methods: of `METHODS`; `NAME-2` and so on are further runs of the same one, see `method_of`.
-        segmenter: of `SEGMENTERS`.
-        slam: of `SLAM_BACKENDS`.
+        segmenter: of `SEGMENTERS`, or the name of one that the caller brings along, see `Parts`.
+        slam: of `SLAM_BACKENDS`, or likewise.
         profile: name of the method's parameters.
         pose_feedback: see `ClosedLoop`.
         renderer: of `RENDERERS`.
@@ -146,6 +146,22 @@ class RunSettings:
         )
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parts:
+    """Parts that the caller brings along, each in the place of the one that the settings name.
+
+    Attributes:
+        segmenter: in place of `RunSettings.segmenter`.
+        front_end: makes what masks the depth of such a camera, in place of every one of `RunSettings.methods`.
+        slam: makes the SLAM back end from the camera and the true pose (4, 4) `T_world_camera` of the first frame,
+            which fixes the world of its estimates; in place of `RunSettings.slam`.
+    """
+
+    segmenter: Segmenter | None = None
+    front_end: Callable[[Intrinsics], FrontEnd] | None = None
+    slam: Callable[[Intrinsics, FloatArray], SlamBackend] | None = None
+
+
 def method_of(name: str) -> str:
     """The method that a name in a report stands for: `dotmask` for `dotmask`, `dotmask-2` and so on."""
     return name.partition("-")[0]
@@ -171,7 +187,9 @@ def run(scenario: Scenario, settings: RunSettings, out: Path, advance: Callable[
     return run_source(Simulated(scenario, settings.renderer, settings.threads), settings, out, advance)
 
 
-def run_source(source: Source, settings: RunSettings, out: Path, advance: Callable[[], None]) -> Report:
+def run_source(
+    source: Source, settings: RunSettings, out: Path, advance: Callable[[], None], parts: Parts | None = None
+) -> Report:
     """Run the methods on the frames of a source and write the run folder `out`.
 
     Args:
@@ -179,11 +197,13 @@ def run_source(source: Source, settings: RunSettings, out: Path, advance: Callab
         settings: how it is run; the renderer is the source's business.
         out: a new or empty folder.
         advance: called after every frame.
+        parts: of the caller; the settings' names of them are what the report says.
 
     Raises:
         ScenarioError, SimError, DotmaskError: bad input; nothing is left in `out`.
     """
-    segmenter = _segmenter(source, settings)
+    parts = parts or Parts()
+    segmenter = _segmenter(source, settings) if parts.segmenter is None else parts.segmenter
     at_once = 1 if settings.threads == 1 else len(settings.methods)
     with RunFolder(out) as folder, one_opencv_thread(), ThreadPoolExecutor(at_once) as pool:
         source.describe(folder)
@@ -203,12 +223,10 @@ def run_source(source: Source, settings: RunSettings, out: Path, advance: Callab
             if not loops:
                 # The first true pose fixes the world of the estimates, as the alignment of a trajectory would.
                 start = np.eye(4) if truth.T_world_camera is None else truth.T_world_camera
-                chosen = get_profile(settings.profile)
+                front_ends = {name: _front_end(name, segmenter, settings, frame, parts) for name in settings.methods}
                 loops = {
-                    name: closed_loop(
-                        METHODS[method_of(name)](segmenter, chosen), settings, frame, start, folder.path / name
-                    )
-                    for name in settings.methods
+                    name: closed_loop(front_end, settings, frame, start, folder.path / name, parts.slam)
+                    for name, front_end in front_ends.items()
                 }
                 if settings.video:
                     size = (frame.intrinsics.width, frame.intrinsics.height)
@@ -266,6 +284,13 @@ def _segmenter(source: Source, settings: RunSettings) -> Segmenter:
     return source.oracle
 
 
+def _front_end(name: str, segmenter: Segmenter, settings: RunSettings, first: RgbdFrame, parts: Parts) -> FrontEnd:
+    """What masks the depth for the method called `name`."""
+    if parts.front_end is not None:
+        return parts.front_end(first.intrinsics)
+    return METHODS[method_of(name)](segmenter, get_profile(settings.profile))
+
+
 def _map_maker(source: Source, settings: RunSettings) -> "MapMaker":
     from scenarios.mapping import MapMaker  # loads what is needed by those who want a map alone
 
@@ -273,7 +298,12 @@ def _map_maker(source: Source, settings: RunSettings) -> "MapMaker":
 
 
 def closed_loop(
-    front_end: FrontEnd, settings: RunSettings, first: RgbdFrame, T_world_camera: FloatArray, files: Path
+    front_end: FrontEnd,
+    settings: RunSettings,
+    first: RgbdFrame,
+    T_world_camera: FloatArray,
+    files: Path,
+    make_slam: Callable[[Intrinsics, FloatArray], SlamBackend] | None = None,
 ) -> ClosedLoop:
     """The front end in a loop with the SLAM of the settings.
 
@@ -283,9 +313,12 @@ def closed_loop(
         first: the first frame.
         T_world_camera: (4, 4) its true pose, which fixes the world of the estimates.
         files: folder and stem of the files that SLAM leaves.
+        make_slam: see `Parts.slam`.
     """
     slam: SlamBackend
-    if settings.rtabmap is None:
+    if make_slam is not None:
+        slam = make_slam(first.intrinsics, T_world_camera)
+    elif settings.rtabmap is None:
         slam = EmbeddedSlam(first.intrinsics, T_world_camera)
     else:
         database, log = (files.with_name(f"rtabmap_{files.name}.{kind}") for kind in ("db", "log"))
