@@ -14,7 +14,7 @@ from dotmask.errors import SegmenterError
 
 
 def load_weights(
-    network: nn.Module, path: Path, name: str, sha256: str, is_obsolete: Callable[[str], bool] = lambda tensor: False
+    network: nn.Module, path: Path, name: str, sha256: str, rename: Callable[[str], str | None] = lambda old: old
 ) -> None:
     """Fill a network with the tensors of a file.
 
@@ -25,7 +25,8 @@ def load_weights(
         path: a `.safetensors` file, or else what `torch.save` wrote of a state dict.
         name: what to call the network in messages.
         sha256: of the file, as it was when the run was planned.
-        is_obsolete: tells the names of tensors that older versions of the network had and that mean nothing.
+        rename: from the name of a tensor in the file to that in the network; None where early versions had a tensor
+            that means nothing.
 
     Raises:
         SegmenterError: the file cannot be read, is another one than planned, holds code or anything else than tensors,
@@ -37,7 +38,7 @@ def load_weights(
         raise SegmenterError(f"{path}: cannot be read ({error.strerror})") from error
     if hashlib.sha256(content).hexdigest() != sha256:
         raise SegmenterError(f"{path}: has changed since this run was planned; start it again")
-    given = {key: value for key, value in _tensors(content, path).items() if not is_obsolete(key)}
+    given = {new: value for old, value in _tensors(content, path).items() if (new := rename(old)) is not None}
     wanted = network.state_dict()
     _check_fit(given, wanted, f"{path}: no weights of {name}")
     network.load_state_dict(given)
@@ -50,7 +51,7 @@ def _tensors(content: bytes, path: Path) -> Mapping[str, Tensor]:
             return tensors_from_safetensors(content)
         loaded = torch.load(io.BytesIO(content), map_location="cpu", weights_only=True)
     except Exception as error:  # damaged bytes fail in many ways, in either library
-        if isinstance(error, pickle.UnpicklingError) and "Unsupported" in str(error):
+        if isinstance(error, pickle.UnpicklingError) and "unsupported global" in str(error).lower():
             reason = "holds code or objects beside tensors, and none of it was run"
         else:
             reason = f"is no {path.suffix if path.suffix == '.safetensors' else 'PyTorch'} file, or is cut short"

@@ -73,18 +73,18 @@ def load_network(choice: NetworkChoice) -> Segmenter:
     device = torch.device(choice.device)
     network: nn.Module
     if choice.name == "mask_rcnn":
-        from dotmask.segmentation.mask_rcnn import MaskRcnnSegmenter, mask_rcnn
+        from dotmask.segmentation.mask_rcnn import MaskRcnnSegmenter, current_name, mask_rcnn
 
         network = mask_rcnn()
-        load_weights(network, choice.weights, choice.name, choice.weights_sha256)
+        load_weights(network, choice.weights, choice.name, choice.weights_sha256, current_name)
         return MaskRcnnSegmenter(network, device)
     from dotmask.segmentation.yolact.design import COMPACT, YOLACT, YOLACT_PLUS
-    from dotmask.segmentation.yolact.network import Yolact, is_obsolete
+    from dotmask.segmentation.yolact.network import Yolact, current_name
     from dotmask.segmentation.yolact.segmenter import YolactSegmenter
 
     design = {"yolact": YOLACT, "yolact++": YOLACT_PLUS, "compact": COMPACT}[choice.name]
     network = Yolact(design)
-    load_weights(network, choice.weights, choice.name, choice.weights_sha256, is_obsolete)
+    load_weights(network, choice.weights, choice.name, choice.weights_sha256, current_name)
     return YolactSegmenter(network, design, device)
 
 

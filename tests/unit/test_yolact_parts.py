@@ -149,10 +149,10 @@ def test_images_are_stretched_and_normalised() -> None:
         np.testing.assert_allclose(image[0, channel], wanted, atol=1e-5)
 
 
-def slow_deformable(x, offsets, modulation, weight, bias, stride: int, padding: int) -> torch.Tensor:  # noqa: ANN001
+def slow_deformable(x, offsets, modulation, weight, bias, stride: int, padding: int) -> torch.Tensor:
     """Equation 1 of the paper, tap by tap and corner by corner."""
     batch, channels, height, width = x.shape
-    out_channels, _, kernel, _ = weight.shape
+    kernel = weight.shape[2]
     rows, columns = modulation.shape[2:]
     out = bias[None, :, None, None].repeat(batch, 1, rows, columns)
     for b, i, j, r, c in itertools.product(range(batch), range(rows), range(columns), range(kernel), range(kernel)):

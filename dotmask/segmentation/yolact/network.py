@@ -1,5 +1,6 @@
 """The network: backbone, pyramid, prototypes and head."""
 
+import re
 from typing import NamedTuple
 
 import torch
@@ -10,6 +11,8 @@ from dotmask.segmentation.yolact.design import YolactDesign
 from dotmask.segmentation.yolact.heads import MaskIouNet, PredictionHead, prototype_network
 from dotmask.segmentation.yolact.pyramid import FeaturePyramid
 from dotmask.segmentation.yolact.resnet import ResNet50
+
+_OBSOLETE = re.compile(r"backbone\.layer\d+\.|fpn\.downsample_layers\.([2-9]|\d\d+)\.")
 
 
 class Answer(NamedTuple):
@@ -64,13 +67,10 @@ class Yolact(nn.Module):
         return Answer(offsets, logits, coefficients, prototypes, semantic)
 
 
-def is_obsolete(tensor: str) -> bool:
-    """Whether a name is one that early versions of the authors' program wrote beside the others.
+def current_name(old: str) -> str | None:
+    """The name of a tensor of an authors' checkpoint; None for what early versions of their program wrote beside.
 
-    They named the backbone's stages a second time, and had more than the two convolutions for P6 and P7. The authors'
+    Those named the backbone's stages a second time, and had more than the two convolutions for P6 and P7. The authors'
     own program leaves out both when it reads a checkpoint.
     """
-    parts = tensor.split(".")
-    if parts[:2] == ["fpn", "downsample_layers"] and len(parts) > 2 and parts[2].isdigit():
-        return int(parts[2]) > 1
-    return parts[0] == "backbone" and len(parts) > 1 and parts[1].startswith("layer") and parts[1][5:].isdigit()
+    return None if _OBSOLETE.match(old) else old
