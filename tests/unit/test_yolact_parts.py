@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 import torch
+from torch import Tensor
 from torch.nn import functional
 
 from dotmask.segmentation.yolact.anchors import anchors_of, decode
@@ -86,7 +87,9 @@ def slow_fast_nms(boxes: list[list[float]], scores: list[list[float]]) -> list[t
     return sorted(kept, key=lambda pair: -scores[pair[0]][pair[1]])[:100]
 
 
-@pytest.mark.parametrize(("anchors", "classes", "sharpness"), [(300, 3, 4.0), (60, 5, 2.0), (40, 80, 0.1)])
+@pytest.mark.parametrize(
+    ("anchors", "classes", "sharpness"), [(300, 3, 4.0), (60, 5, 2.0), (600, 1, 3.0), (40, 80, 0.1)]
+)
 def test_fast_nms(anchors: int, classes: int, sharpness: float) -> None:
     generator = torch.Generator().manual_seed(2)
     corners = torch.rand(anchors, 2, generator=generator).round(decimals=1)  # many overlap
@@ -99,6 +102,22 @@ def test_fast_nms(anchors: int, classes: int, sharpness: float) -> None:
     assert list(zip(found.coefficients[:, 0].int().tolist(), found.classes.tolist(), strict=True)) == wanted
     torch.testing.assert_close(found.boxes, boxes[[anchor for anchor, _ in wanted]])
     assert found.scores.tolist() == [probabilities[anchor, number + 1].item() for anchor, number in wanted]
+
+
+def test_the_limits_of_fast_nms() -> None:
+    def found(scores: Tensor) -> list[float]:
+        corners = torch.arange(float(len(scores)))[:, None].expand(-1, 2)  # apart from each other
+        boxes = torch.cat([corners, corners + 0.5], dim=1)
+        probabilities = torch.stack([1 - scores, scores], dim=1)
+        return fast_nms(boxes, scores[:, None], probabilities).scores.tolist()
+
+    assert found(torch.tensor([0.0499, 0.05, 0.0501])) == [pytest.approx(0.0501)]
+    many = torch.linspace(0.9, 0.1, 300)
+    assert found(many) == many[:100].tolist()
+    lower = torch.cat([torch.full((200,), 0.9), torch.tensor([0.8])])
+    boxes = torch.tensor([[0.0, 0.0, 1.0, 1.0]] * 200 + [[5.0, 5.0, 6.0, 6.0]])
+    kept = fast_nms(boxes, lower[:, None], torch.stack([1 - lower, lower], dim=1)).scores.tolist()
+    assert kept == [pytest.approx(0.9)], "the 201st of a class is not looked at, though nothing is near it"
 
 
 def test_fast_nms_lets_what_is_dropped_drop_others() -> None:
@@ -149,7 +168,7 @@ def test_images_are_stretched_and_normalised() -> None:
         np.testing.assert_allclose(image[0, channel], wanted, atol=1e-5)
 
 
-def slow_deformable(x, offsets, modulation, weight, bias, stride: int, padding: int) -> torch.Tensor:
+def slow_deformable(x, offsets, modulation, weight, bias, stride: int, padding: int) -> Tensor:
     """Equation 1 of the paper, tap by tap and corner by corner."""
     batch, channels, height, width = x.shape
     kernel = weight.shape[2]
@@ -171,7 +190,7 @@ def slow_deformable(x, offsets, modulation, weight, bias, stride: int, padding: 
 def test_deformable_convolution(stride: int) -> None:
     generator = torch.Generator().manual_seed(6)
 
-    def draw(*shape: int) -> torch.Tensor:
+    def draw(*shape: int) -> Tensor:
         return torch.randn(*shape, generator=generator, dtype=torch.float64)
 
     x, weight, bias = draw(2, 3, 6, 7), draw(4, 3, 3, 3), draw(4)
