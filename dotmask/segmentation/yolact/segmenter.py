@@ -25,7 +25,7 @@ class YolactSegmenter:
     def __init__(self, network: Yolact, design: YolactDesign, device: torch.device) -> None:
         self._design, self._device = design, device
         self._type = torch.float16 if device.type == "cuda" else torch.float32
-        self._network = network.eval().to(device, self._type)
+        self._network = network.eval().to(device, self._type).to(memory_format=torch.channels_last)
         self._anchors = anchors_of(design).to(device)
 
     def segment(self, frame: RgbdFrame) -> Detections:
@@ -36,11 +36,10 @@ class YolactSegmenter:
                 network_image(frame.rgb, self._design.height, self._design.width, self._device)
             )
             best = found.scores >= LEAST_SCORE
-            pixels = full_size(masks[best], height, width)
             edges_px = found.boxes[best] * found.boxes.new_tensor([width, height, width, height])
             names = [self._design.class_names[index] for index in found.classes[best].tolist()]
             return detections_from(
-                pixels.cpu().numpy(),
+                full_size(masks[best].cpu().numpy(), height, width),
                 edges_px.cpu().numpy(),
                 names,
                 found.scores[best].cpu().numpy(),
