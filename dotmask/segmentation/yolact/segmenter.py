@@ -25,7 +25,7 @@ class YolactSegmenter:
     def __init__(self, network: Yolact, design: YolactDesign, device: torch.device) -> None:
         self._design, self._device = design, device
         self._type = torch.float16 if device.type == "cuda" else torch.float32
-        self._network = network.eval().to(device, self._type).to(memory_format=torch.channels_last)
+        self._network = network.eval().to(device, self._type)
         self._anchors = anchors_of(design).to(device)
 
     def segment(self, frame: RgbdFrame) -> Detections:
@@ -48,7 +48,7 @@ class YolactSegmenter:
 
     def _instances(self, image: Tensor) -> tuple[Detected, Tensor]:
         """Detections in an image, and their masks (N, h, w) in 0..1 at the size of the prototypes."""
-        answer = self._network(image.to(self._type))
+        answer = self._network(image.to(self._type).contiguous(memory_format=torch.channels_last))
         # What follows is little work, and boxes need more than the eleven bits of float16.
         offsets, logits, coefficients, prototypes = (part[0].float() for part in answer[:4])
         found = fast_nms(decode(offsets, self._anchors), coefficients, torch.softmax(logits, dim=-1))
