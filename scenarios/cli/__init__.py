@@ -9,7 +9,7 @@ import traceback
 
 import typer
 
-from scenarios.cli import causes, machine, runs, scenes, studies
+from scenarios.cli import causes, machine, runs, scenes, segmenters, studies
 from scenarios.errors import ScenarioError
 
 app = typer.Typer(
@@ -28,6 +28,7 @@ app.command()(scenes.render)
 app.command()(runs.run)
 app.command()(causes.attribute)
 app.command()(causes.counterfactual)
+app.command("evaluate-segmenter")(segmenters.evaluate_segmenter)
 app.command()(scenes.check)
 app.command()(machine.bench)
 app.command()(studies.validate)

@@ -6,13 +6,28 @@ from typing import Annotated
 import typer
 
 from scenarios.cli.display import console, progress_bar
-from scenarios.cli.options import Feedback, Frames, OptionalName, Overrides, Renderer, Seed, Source, Threads, resolve
+from scenarios.cli.options import (
+    Device,
+    Feedback,
+    Frames,
+    OptionalName,
+    Overrides,
+    Renderer,
+    Seed,
+    Segmenter,
+    Source,
+    Threads,
+    Weights,
+    resolve,
+)
 
 
 def attribute(
     name: OptionalName = None,
     source: Source = None,
-    segmenter: Annotated[str, typer.Option(help="Segmenter: oracle.")] = "oracle",
+    segmenter: Segmenter = "oracle",
+    weights: Weights = None,
+    device: Device = None,
     profile: Annotated[str, typer.Option(help="Parameters of the method: paper, calibrated.")] = "calibrated",
     pose_feedback: Feedback = None,
     renderer: Renderer = "numba",
@@ -42,6 +57,8 @@ def attribute(
     settings = RunSettings.parse(
         methods="dotmask",
         segmenter=segmenter,
+        weights=weights,
+        device=device,
         profile=profile,
         pose_feedback=pose_feedback,
         renderer=renderer,
@@ -64,7 +81,9 @@ def attribute(
 def counterfactual(
     name: OptionalName = None,
     source: Source = None,
-    segmenter: Annotated[str, typer.Option(help="Segmenter: oracle.")] = "oracle",
+    segmenter: Segmenter = "oracle",
+    weights: Weights = None,
+    device: Device = None,
     profile: Annotated[str, typer.Option(help="Parameters of the method: paper, calibrated.")] = "calibrated",
     pose_feedback: Feedback = None,
     renderer: Renderer = "numba",
@@ -90,7 +109,13 @@ def counterfactual(
 
     scenario = resolve(name, source, overrides, seed, frames)
     settings = RunSettings.parse(
-        segmenter=segmenter, profile=profile, pose_feedback=pose_feedback, renderer=renderer, threads=threads
+        segmenter=segmenter,
+        weights=weights,
+        device=device,
+        profile=profile,
+        pose_feedback=pose_feedback,
+        renderer=renderer,
+        threads=threads,
     )
     folder = out or default_out(scenario, "counterfactual-")
     with progress_bar() as progress:

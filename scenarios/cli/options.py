@@ -22,6 +22,14 @@ Frames = Annotated[int | None, typer.Option(help="Number of frames.")]
 Feedback = Annotated[
     str | None, typer.Option(help="Pose for the tracker: previous, constant_velocity, refined. Default: profile's.")
 ]
+Segmenter = Annotated[
+    str,
+    typer.Option(
+        help="Segmenter: oracle, none, a network (yolact, yolact++, mask_rcnn, compact) or package.module:factory."
+    ),
+]
+Weights = Annotated[Path | None, typer.Option(metavar="FILE", help="Weights of a network: .pth or .safetensors.")]
+Device = Annotated[str | None, typer.Option(help="Where a network runs: cpu, cuda.", show_default="cpu")]
 Renderer = Annotated[str, typer.Option(help="Renderer: numba, pyrender.")]
 SlamParameters = Annotated[
     str | None, typer.Option(help="Parameters of RTAB-Map: default, refined.", show_default="default")

@@ -8,6 +8,7 @@ import typer
 
 from scenarios.cli.display import console, progress_bar
 from scenarios.cli.options import (
+    Device,
     Feedback,
     Frames,
     Overrides,
@@ -17,6 +18,7 @@ from scenarios.cli.options import (
     SlamSet,
     Source,
     Threads,
+    Weights,
     is_folder_name,
     resolve,
 )
@@ -31,11 +33,20 @@ def run(
     source: Source = None,
     methods: Annotated[
         str | None,
-        typer.Option(help="Comma-separated: unmasked, mdi, dotmask. Default: all that have something to mask."),
+        typer.Option(
+            help="Comma-separated: unmasked, mdi, dotmask; dotmask-oracle beside another segmenter. Default: all that "
+            "have something to mask."
+        ),
     ] = None,
     segmenter: Annotated[
-        str | None, typer.Option(help="Segmenter: oracle, none. Default: oracle, of a folder none.")
+        str | None,
+        typer.Option(
+            help="Segmenter: oracle, none, a network (yolact, yolact++, mask_rcnn, compact) or package.module:factory. "
+            "Default: oracle, of a folder none."
+        ),
     ] = None,
+    weights: Weights = None,
+    device: Device = None,
     slam: Annotated[str, typer.Option(help="SLAM back end: embedded, rtabmap.")] = "embedded",
     slam_parameters: SlamParameters = None,
     slam_set: SlamSet = None,
@@ -78,6 +89,8 @@ def run(
 
     dotmask run --from runs/fast/scenario.json --out runs/again
 
+    dotmask run fr3_walking_xyz --segmenter yolact --weights yolact_resnet50_54_800000.pth
+
     dotmask run data/rgbd_dataset_freiburg3_walking_xyz
 
     dotmask run smoke --slam rtabmap --slam-parameters refined --slam-set Vis/MinInliers=12
@@ -90,6 +103,9 @@ def run(
     settings = RunSettings.parse(
         methods=methods,
         segmenter=segmenter or ("none" if is_folder else "oracle"),
+        weights=weights,
+        device=device,
+        has_truth=not is_folder,
         slam=slam,
         slam_parameters=slam_parameters,
         slam_changes=slam_set or (),

@@ -7,15 +7,18 @@ import typer
 
 from scenarios.cli.display import console, progress_bar
 from scenarios.cli.options import (
+    Device,
     Feedback,
     Frames,
     OptionalName,
     Overrides,
     Renderer,
+    Segmenter,
     SlamParameters,
     SlamSet,
     Source,
     Threads,
+    Weights,
     resolve,
 )
 from scenarios.errors import ScenarioError
@@ -25,7 +28,9 @@ def tables(
     slam: Annotated[str, typer.Option(help="SLAM back end: embedded, rtabmap.")] = "embedded",
     slam_parameters: SlamParameters = None,
     slam_set: SlamSet = None,
-    segmenter: Annotated[str, typer.Option(help="Segmenter: oracle.")] = "oracle",
+    segmenter: Segmenter = "oracle",
+    weights: Weights = None,
+    device: Device = None,
     profile: Annotated[str, typer.Option(help="Parameters of the method: paper, calibrated.")] = "calibrated",
     quick: Annotated[bool, typer.Option("--quick", help="The first 150 frames of each sequence.")] = False,
     repeat: Annotated[
@@ -55,6 +60,8 @@ def tables(
         slam_parameters=slam_parameters,
         slam_changes=slam_set or (),
         segmenter=segmenter,
+        weights=weights,
+        device=device,
         profile=profile,
         threads=threads,
         repeats=repeat,
@@ -145,7 +152,9 @@ def sweep(
     retry_failed: Annotated[
         bool, typer.Option("--retry-failed", help="Run the cells again that failed in an earlier command.")
     ] = False,
-    segmenter: Annotated[str, typer.Option(help="Segmenter: oracle, none.")] = "oracle",
+    segmenter: Segmenter = "oracle",
+    weights: Weights = None,
+    device: Device = None,
     slam: Annotated[str, typer.Option(help="SLAM back end: embedded, rtabmap.")] = "embedded",
     slam_parameters: SlamParameters = None,
     profile: Annotated[
@@ -181,6 +190,8 @@ def sweep(
 
     words = {
         "segmenter": segmenter,
+        "weights": None if weights is None else str(weights),
+        "device": device,
         "slam": slam,
         "slam_parameters": slam_parameters,
         "profile": profile,
