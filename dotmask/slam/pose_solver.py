@@ -152,7 +152,7 @@ class PoseSolver:
         T, seen = T_camera_world, self._seen(p_world, pixels, depth_m)
         for _ in range(GAUSS_NEWTON_STEPS):
             hessian, gradient = self._linearise(T, seen).normal_equations()
-            step: FloatArray = -np.linalg.solve(hessian, gradient)
+            step = np.asarray(-np.linalg.solve(hessian, gradient), float)
             T = _rigid(step[:3], step[3:]) @ T
             if np.abs(step).max() < CONVERGED:
                 break
