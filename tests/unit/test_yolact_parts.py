@@ -155,8 +155,12 @@ def slow_bilinear(image: np.ndarray, height: int, width: int) -> np.ndarray:
 
 def test_masks_at_the_size_of_the_image() -> None:
     soft = torch.rand(2, 5, 7, generator=torch.Generator().manual_seed(4))
-    for mask, known in zip(full_size(soft, 23, 31), soft, strict=True):
-        np.testing.assert_array_equal(mask, slow_bilinear(known.numpy(), 23, 31) > 0.5)
+    for size in ((23, 31), (4, 3)):
+        masks = full_size(soft.numpy(), *size)
+        for mask, known in zip(masks, soft, strict=True):
+            np.testing.assert_array_equal(mask, slow_bilinear(known.numpy(), *size) > 0.5)
+        by_torch = functional.interpolate(soft[None], size, mode="bilinear", align_corners=False)[0] > 0.5
+        np.testing.assert_array_equal(masks, by_torch)
 
 
 def test_images_are_stretched_and_normalised() -> None:

@@ -1,39 +1,37 @@
-"""A small backbone of inverted residuals (Sandler et al., "MobileNetV2", CVPR 2018)."""
+"""A small backbone: basic residual blocks (He et al., CVPR 2016), which a CPU does faster than ones by channel."""
 
 from torch import Tensor, nn
 
-STEM = 24
+STEM = 16
 """Channels of the first convolution."""
 
-EXPANSION = 4
-"""A block works on so many times the channels that it is given."""
-
-STAGES = ((32, 2), (56, 3), (112, 5), (192, 4))
+STAGES = ((32, 1), (64, 2), (128, 2), (192, 2))
 """Channels and blocks at a quarter, an eighth, a sixteenth and a thirty-second of the size."""
 
 
-class InvertedResidual(nn.Module):
-    """1x1 to many channels, 3x3 on each of them alone, 1x1 back to few."""
+class BasicBlock(nn.Module):
+    """Two 3x3 convolutions beside a shortcut."""
 
-    def __init__(self, channels_in: int, channels_out: int, stride: int) -> None:
+    def __init__(self, channels_in: int, channels: int, stride: int) -> None:
         super().__init__()
-        hidden = EXPANSION * channels_in
-        self._has_shortcut = stride == 1 and channels_in == channels_out
         self.layers = nn.Sequential(
-            nn.Conv2d(channels_in, hidden, 1, bias=False),
-            nn.BatchNorm2d(hidden),
+            nn.Conv2d(channels_in, channels, 3, stride, padding=1, bias=False),
+            nn.BatchNorm2d(channels),
             nn.ReLU(inplace=True),
-            nn.Conv2d(hidden, hidden, 3, stride, padding=1, groups=hidden, bias=False),
-            nn.BatchNorm2d(hidden),
-            nn.ReLU(inplace=True),
-            nn.Conv2d(hidden, channels_out, 1, bias=False),
-            nn.BatchNorm2d(channels_out),
+            nn.Conv2d(channels, channels, 3, padding=1, bias=False),
+            nn.BatchNorm2d(channels),
+        )
+        self.relu = nn.ReLU(inplace=True)
+        self.shortcut: nn.Module = (
+            nn.Identity()
+            if stride == 1
+            else nn.Sequential(nn.Conv2d(channels_in, channels, 1, stride, bias=False), nn.BatchNorm2d(channels))
         )
 
     def forward(self, x: Tensor) -> Tensor:
-        """(B, C, H, W) to (B, O, h, w)."""
-        y: Tensor = self.layers(x)
-        return x + y if self._has_shortcut else y
+        """(B, C, H, W) to (B, channels, h, w)."""
+        y: Tensor = self.relu(self.layers(x) + self.shortcut(x))
+        return y
 
 
 class CompactBackbone(nn.Module):
@@ -50,8 +48,8 @@ class CompactBackbone(nn.Module):
         self.stages = nn.ModuleList()
         channels_in = STEM
         for channels, blocks in STAGES:
-            made: list[nn.Module] = [InvertedResidual(channels_in, channels, 2)]
-            made += [InvertedResidual(channels, channels, 1) for _ in range(blocks - 1)]
+            made: list[nn.Module] = [BasicBlock(channels_in, channels, 2)]
+            made += [BasicBlock(channels, channels, 1) for _ in range(blocks - 1)]
             self.stages.append(nn.Sequential(*made))
             channels_in = channels
 

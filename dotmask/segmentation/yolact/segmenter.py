@@ -36,11 +36,10 @@ class YolactSegmenter:
                 network_image(frame.rgb, self._design.height, self._design.width, self._device)
             )
             best = found.scores >= LEAST_SCORE
-            pixels = full_size(masks[best], height, width)
             edges_px = found.boxes[best] * found.boxes.new_tensor([width, height, width, height])
             names = [self._design.class_names[index] for index in found.classes[best].tolist()]
             return detections_from(
-                pixels.cpu().numpy(),
+                full_size(masks[best].cpu().numpy(), height, width),
                 edges_px.cpu().numpy(),
                 names,
                 found.scores[best].cpu().numpy(),
@@ -49,7 +48,7 @@ class YolactSegmenter:
 
     def _instances(self, image: Tensor) -> tuple[Detected, Tensor]:
         """Detections in an image, and their masks (N, h, w) in 0..1 at the size of the prototypes."""
-        answer = self._network(image.to(self._type))
+        answer = self._network(image.to(self._type).contiguous(memory_format=torch.channels_last))
         # What follows is little work, and boxes need more than the eleven bits of float16.
         offsets, logits, coefficients, prototypes = (part[0].float() for part in answer[:4])
         found = fast_nms(decode(offsets, self._anchors), coefficients, torch.softmax(logits, dim=-1))
