@@ -88,6 +88,19 @@ def load_network(choice: NetworkChoice) -> Segmenter:
     return YolactSegmenter(network, design, device)
 
 
+def pytorch() -> str:
+    """Which PyTorch networks run on here.
+
+    Raises:
+        SegmenterError: none is installed.
+    """
+    _check_installed("yolact")
+    import torch
+
+    device = torch.cuda.get_device_name() if torch.cuda.is_available() else "no CUDA"
+    return f"PyTorch {torch.__version__}, {device}"
+
+
 @contextmanager
 def network_threads(count: int) -> Iterator[None]:
     """PyTorch works with so many threads inside the block."""

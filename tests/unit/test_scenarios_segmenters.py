@@ -17,6 +17,7 @@ from dotmask.records import Intrinsics, RgbdFrame
 from dotmask.segmentation.networks import NETWORKS, choose_network
 from dotmask.segmentation.yolact.design import COMPACT
 from dotmask.segmentation.yolact.network import Yolact
+from scenarios.doctor import examine
 from scenarios.errors import ScenarioError
 from scenarios.finished_runs import figure_settings, run_key, run_name
 from scenarios.registry import scenario
@@ -213,6 +214,14 @@ def test_without_pytorch_the_extra_is_named(name: str, monkeypatch: pytest.Monke
         SegmenterError, match=rf"--segmenter {re.escape(name)}: torch is not installed; run pip install 'd"
     ):
         choose_network(name, None, "cpu")
+
+
+def test_doctor_says_what_networks_run_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = next(finding for finding in examine() if finding.what == "networks")
+    assert (found.is_well, found.is_needed, torch.__version__ in found.said) == (True, True, True)
+    monkeypatch.setitem(sys.modules, "torch", None)
+    lacking = next(finding for finding in examine() if finding.what == "networks")
+    assert (lacking.is_well, lacking.is_needed) == (False, False)
 
 
 def test_without_torchvision_the_other_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
