@@ -223,8 +223,24 @@ def test_scores_of_yolact_plus_are_multiplied_with_the_expected_iou() -> None:
     torch.nn.init.constant_(last.bias, 0.2)
     last.bias.data[COCO_CLASSES.index("person")] = 0.7
     found = YolactSegmenter(network, design, CPU).segment(frame())
+    assert len(found) > 3
     np.testing.assert_allclose(found.scores, 0.63, atol=1e-5)
     assert (found.masks.sum(axis=(1, 2)) >= 25).all()
+
+
+@pytest.mark.parametrize("design", [COMPACT, replace(YOLACT_PLUS, height=256, width=256)], ids=["compact", "yolact++"])
+def test_half_precision_as_on_a_gpu_finds_nearly_the_same(design: YolactDesign) -> None:
+    network = detecting(design, "person")
+    if network.maskiou_net is not None:
+        network.maskiou_net.maskiou_net[10].bias.data += 0.7
+    single = YolactSegmenter(network, design, CPU).segment(frame(320, 240))
+    segmenter = YolactSegmenter(network, design, CPU)
+    segmenter._type, segmenter._network = torch.float16, network.half()
+    half = segmenter.segment(frame(320, 240))
+    assert len(half) == len(single) > 3
+    apart = np.abs(single.boxes_px[:, None] - half.boxes_px[None]).max(axis=2).min(axis=1)
+    assert np.quantile(apart, 0.9) < 0.05, "pixels"
+    np.testing.assert_allclose(np.sort(half.scores), np.sort(single.scores), atol=2e-3)
 
 
 def test_nothing_found_is_no_error() -> None:
