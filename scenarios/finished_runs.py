@@ -26,7 +26,7 @@ NOT_MEASURED_WITH = ("scenarios/tables/", "scenarios/sweep/", "scenarios/finishe
 """Code that no figure depends on."""
 
 NO_INFLUENCE = ("threads", "video")
-"""Settings that change no figure but times."""
+"""Settings that change no figure but times; see `figure_settings` for what threads do to a network."""
 
 
 @cache
@@ -42,10 +42,15 @@ def code_hash() -> str:
 
 
 def figure_settings(settings: RunSettings) -> dict[str, Any]:
-    """The settings that decide the figures, by name; of weights their hash, wherever they lie."""
+    """The settings that decide the figures, by name.
+
+    Of weights that is their hash, wherever they lie. With a network it is the number of threads too: sums are split
+    among them, and the last bits of the answer depend on how.
+    """
     found = {name: value for name, value in asdict(settings).items() if name not in NO_INFLUENCE}
     if settings.network is not None:
         del found["network"]["weights"]
+        found["network"]["threads"] = settings.threads
     return found
 
 
