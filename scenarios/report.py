@@ -331,13 +331,16 @@ def table(report: Report) -> Table:
 
 
 def times(report: Report) -> str:
-    """One line: wall time per frame of making the frames, CPU time per frame of each method's stages."""
+    """One line: wall time per frame of making the frames and of a network, CPU time of each method's stages."""
     parts = []
     for name, method in report.methods.items():
         masking = _method_ms(method.time_ms)
         stages = [] if masking is None else [f"masking {masking:.1f}"]
         parts.append(f"{name}: {', '.join([*stages, f'odometry {_number(method.time_ms.odometry)}'])}")
     world = "" if report.time_ms.render is None else f"render {_number(report.time_ms.render)} (wall); "
+    segmenting = [m.time_ms.segment for m in report.methods.values() if m.time_ms.segment is not None]
+    if report.segmenter.device is not None and segmenting:
+        world += f"{report.segmenter.name} {_number(max(segmenting))} (wall); "  # the oracle beside it takes no time
     return f"ms per frame: {world}CPU of " + "; ".join(parts)
 
 
