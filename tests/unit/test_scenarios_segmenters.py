@@ -233,6 +233,15 @@ def test_without_torchvision_the_other_extra_is_named(monkeypatch: pytest.Monkey
         choose_network("mask_rcnn", None, "cpu")
 
 
+def test_a_torchvision_that_does_not_fit_is_said_to_be_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "torchvision.py").write_text("raise RuntimeError('operator torchvision::nms does not exist')")
+    for name in [name for name in sys.modules if name.partition(".")[0] == "torchvision"]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(SegmenterError, match=r"does not work with the installed PyTorch \(operator torchvision::nms"):
+        choose_network("mask_rcnn", None, "cpu")
+
+
 def test_a_gpu_that_is_not_there_is_not_replaced(weights: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
     with pytest.raises(SegmenterError, match="--device cuda: PyTorch finds no CUDA device here; use --device cpu"):
