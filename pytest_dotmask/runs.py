@@ -75,22 +75,22 @@ class DotmaskRun:
         if mask is not None:
             for what, given in (("segmenter", segmenter), ("method", method), ("profile", profile)):
                 if given is not None:
-                    raise ScenarioError(
-                        f"dotmask_run: give mask= or {what}=, not both: a mask function needs no {what}"
-                    )
+                    raise ScenarioError(f"dotmask_run: give mask= or {what}=, not both: a mask needs no {what}")
         chosen = MASK if mask is not None else method or "dotmask"
         if mask is None and chosen not in METHODS:
             raise unknown("method", chosen, METHODS)
         name = name or chosen
+        if Path(name).name != name:
+            raise ScenarioError(f"dotmask_run: name={name!r}: it is a folder's name too, so without a slash")
         if any(run["name"] == name for run in self._recorded):
             raise ScenarioError(f"dotmask_run: this test has a run '{name}' already; give one of them another name=")
-        parameters = get_profile(profile or "calibrated")
+        profile = profile or "calibrated"
         settings = RunSettings(
             methods=(chosen,),
             segmenter=_called(segmenter, "none" if mask is not None else "oracle"),
             slam=_called(slam, "embedded"),
-            profile=profile or "calibrated",
-            pose_feedback=parameters.pose_feedback,
+            profile=profile,
+            pose_feedback=get_profile(profile).pose_feedback,
             renderer=RENDERER,
             threads=self._frames.threads,
             video=False,

@@ -58,7 +58,7 @@ class DotmaskSession:
         config: with the options.
 
     Raises:
-        ScenarioError: the baseline cannot be read, or a folder of a file that is to be written is missing.
+        ScenarioError: the baseline cannot be read, or there is no folder for the summary.
     """
 
     def __init__(self, config: pytest.Config) -> None:
@@ -68,6 +68,8 @@ class DotmaskSession:
         self._stored: Mapping[RunKey, RunFigures] = {}
         if self._path is not None and (self._path.exists() or not self._is_update):
             self._stored = read_baseline(self._path)
+        if self._summary is not None and not self._summary.absolute().parent.is_dir():
+            raise ScenarioError(f"--dotmask-summary {self._summary}: there is no such folder")
         self._runs: dict[RunKey, RunFigures] = {}
         self._notes: list[str] = []
 
@@ -105,7 +107,7 @@ class DotmaskSession:
 
     def _renew(self, path: Path, session: pytest.Session) -> None:
         if session.testsfailed:
-            self._notes.append(f"{path}: not renewed, since {session.testsfailed} tests failed")
+            self._notes.append(f"{path}: not renewed, since tests have failed")
             return
         if not self._runs:
             raise pytest.UsageError(f"{path}: not renewed, since no test used dotmask_run")

@@ -63,7 +63,8 @@ class RunSettings:
 
     Attributes:
         methods: of `METHODS`, or one of them with `-oracle`: fed by the oracle, beside another segmenter. `NAME-2` and
-            so on are further runs of the same one, see `method_of`.
+            so on are further runs of the same one, see `method_of`. Any name of a front end that the caller brings,
+            see `Parts`.
         segmenter: of `scenarios.segmenters.SEGMENTERS`, `package.module:factory`, or the name of one that the caller
             brings along, see `Parts`.
         slam: of `SLAM_BACKENDS`, or likewise.

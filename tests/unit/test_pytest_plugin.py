@@ -216,6 +216,7 @@ def test_arguments_that_do_not_fit_fail_the_test(pytester: pytest.Pytester) -> N
             for arguments, message in (
                 (dict(mask=nothing, segmenter=object()), "give mask= or segmenter=, not both"),
                 (dict(mask=nothing, method="mdi"), "give mask= or method=, not both"),
+                (dict(name="../a"), "without a slash"),
                 (dict(method="mdj"), "unknown method 'mdj'. Did you mean mdi?"),
                 (dict(mask=lambda *images: np.zeros((3, 4))), r"the size of the image, \\(240, 320\\); got \\(3, 4\\)"),
                 (dict(mask=lambda *images: {{"map": 1}}), "give a mask, or"),
@@ -234,6 +235,7 @@ def test_options_that_cannot_work_are_one_line(suite: pytest.Pytester) -> None:
     for arguments, message in (
         (COMPARE, "--dotmask-baseline baseline.json: there is no such file; write it with --dotmask-update-baseline"),
         (("--dotmask-update-baseline",), "name the file to write with --dotmask-baseline FILE"),
+        (("--dotmask-summary", "no/a.md"), "--dotmask-summary no/a.md: there is no such folder"),
         (("--dotmask-baseline", "test_suite.py"), "test_suite.py: not a baseline (file: Invalid JSON"),
     ):
         result = suite.runpytest(*arguments)
@@ -321,7 +323,7 @@ def test_only_what_was_run_is_renewed_and_nothing_after_a_failure(suite: pytest.
     suite.makepyfile(test_broken="def test_a(): assert False")
     stub.waste = 0.3
     failed = suite.runpytest(*UPDATE)
-    failed.stdout.fnmatch_lines(["baseline.json: not renewed, since 1 tests failed"])
+    failed.stdout.fnmatch_lines(["baseline.json: not renewed, since tests have failed"])
     assert failed.ret == pytest.ExitCode.TESTS_FAILED
     assert stored(suite)["runs"] == before
     suite.runpytest(*UPDATE, "test_other.py").stdout.fnmatch_lines(["kept *: test_suite.py::test_mask[[]smoke]"])
