@@ -247,7 +247,8 @@ def _searched(
 
 def _frames(boxes_px: FloatArray, size: tuple[int, ...]) -> npt.NDArray[np.intp]:
     """(N, 4) first and last column, first and last row of the image of `size` (h, w) where each box may have points."""
-    u_min, v_min, u_max, v_max = boxes_px.astype(np.intp).T // _SCALE
+    within = np.clip(boxes_px, 0, _SCALE * max(size))  # a box may be far larger than any whole number
+    u_min, v_min, u_max, v_max = within.astype(np.intp).T // _SCALE
     last_column, last_row = size[1] - 1 - _MARGIN_PX, size[0] - 1 - _MARGIN_PX
     left, top = np.maximum(u_min, _MARGIN_PX), np.maximum(v_min, _MARGIN_PX)
     return np.stack([left, np.minimum(u_max, last_column), top, np.minimum(v_max, last_row)], axis=1)

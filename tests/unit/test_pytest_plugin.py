@@ -14,7 +14,7 @@ import pytest_dotmask.kept_frames
 import pytest_dotmask.marks
 import pytest_dotmask.runs
 import pytest_dotmask.session
-from scenarios.report import MaskReport, MethodReport, Report, StageTimes, WorldTimes
+from scenarios.report import MaskReport, MethodReport, Report, SegmenterReport, StageTimes, WorldTimes
 
 pytest_plugins = ["pytester"]
 
@@ -73,7 +73,7 @@ class Stub:
             seed=source.seed,
             frames=4,
             renderer="numba",
-            segmenter="none",
+            segmenter=SegmenterReport(name="none"),
             slam="embedded",
             profile="calibrated",
             frame_hash=f"{self.bytes} {source.seed}",

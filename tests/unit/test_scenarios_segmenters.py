@@ -179,7 +179,7 @@ def test_bad_input_is_one_clear_line(arguments: list[str], message: str, here: P
 
 @pytest.mark.parametrize("name", OWN)
 def test_a_mistake_in_a_segmenter_of_ones_own_is_one_line_that_names_the_place(name: str, here: Path) -> None:
-    with pytest.raises(ScenarioError, match=re.escape(f"--segmenter {name}: {OWN[name]}")) as told:
+    with pytest.raises(ScenarioError, match=re.escape(f"segmenter {name}: {OWN[name]}")) as told:
         load_segmenter(name, None, Unknown()).see(frame(np.ones((120, 160), np.float32)), TruePose(T_world_camera=None))
     assert "\n" not in str(told.value)
 
