@@ -80,8 +80,9 @@ def test_a_run_with_a_network_stands_beside_the_oracle(weights: Path, tmp_path: 
         "device": "cpu",
     }
     assert list(report.methods) == ["unmasked", "mdi", "dotmask-oracle", "dotmask"]
-    assert report.methods["mdi"].time_ms.segment == report.methods["dotmask"].time_ms.segment > 1
-    assert report.methods["dotmask-oracle"].time_ms.segment < 1
+    network_ms, oracle_ms = (report.methods[name].time_ms.segment for name in ("dotmask", "dotmask-oracle"))
+    assert report.methods["mdi"].time_ms.segment == network_ms
+    assert network_ms > oracle_ms, "the network's time is charged to those whom it serves"
     assert report.methods["unmasked"].time_ms.segment is None
     assert report.methods["dotmask"].masks.waste > 0.01, "it sees persons everywhere"
     again = dotmask(*arguments, "--methods", "dotmask", "--out", tmp_path / "b")
