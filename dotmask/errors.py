@@ -23,3 +23,7 @@ class SlamError(DotmaskError):
 
 class VocabularyError(DotmaskError):
     """The visual vocabulary of place recognition is missing or damaged."""
+
+
+class SegmenterError(DotmaskError):
+    """A network cannot be used: a package or a device is missing, or its weights are not what they should be."""

@@ -11,9 +11,10 @@ from dotmask.records import FloatArray, Intrinsics
 def inverse(T_a_b: FloatArray) -> FloatArray:
     """`T_b_a` of a rigid transform (4, 4)."""
     R_b_a = T_a_b[:3, :3].T
-    T_b_a = np.eye(4)
+    T_b_a = np.empty((4, 4))
     T_b_a[:3, :3] = R_b_a
     T_b_a[:3, 3] = -R_b_a @ T_a_b[:3, 3]
+    T_b_a[3] = (0.0, 0.0, 0.0, 1.0)
     return T_b_a
 
 

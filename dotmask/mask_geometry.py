@@ -10,23 +10,28 @@ from dotmask.geometry import project
 from dotmask.records import FloatArray, Intrinsics, MaskImage
 
 
-def bounding_rectangle(mask: MaskImage, expected_px: FloatArray | None = None) -> tuple[int, int, int, int]:
-    """Left, top, width, height (pixels) of a mask; all 0 for an empty one.
+def bounding_rectangle(mask: MaskImage) -> tuple[int, int, int, int]:
+    """Left, top, width, height (pixels) of a mask (H, W); all 0 for an empty one."""
+    u, v, width, height = cv2.boundingRect(mask.view(np.uint8))
+    return (u, v, width, height) if width else (0, 0, 0, 0)
+
+
+def enclosing_rectangle(mask: MaskImage, expected_px: FloatArray | None) -> tuple[int, int, int, int]:
+    """Left, top, width, height (pixels) of a rectangle in the image that holds all of a mask; quick if it is expected.
 
     Args:
         mask: (H, W).
-        expected_px: (4,) `u_min, v_min, u_max, v_max` of a box that may hold all of it: if so, the answer takes less
-            time.
+        expected_px: (4,) `u_min, v_min, u_max, v_max` of a box; where it does not hold all of the mask, or is None, the
+            answer is the bounding rectangle.
     """
-    pixels, left, top = mask.view(np.uint8), 0, 0
     if expected_px is not None:
         u_min, v_min, u_max, v_max = expected_px.tolist()
-        u0, v0 = max(int(u_min), 0), max(int(v_min), 0)
-        part = pixels[v0 : max(int(v_max) + 1, 0), u0 : max(int(u_max) + 1, 0)]
+        left, top = max(int(u_min), 0), max(int(v_min), 0)
+        pixels = mask.view(np.uint8)
+        part = pixels[top : max(int(v_max) + 1, 0), left : max(int(u_max) + 1, 0)]
         if part.size and cv2.countNonZero(part) == cv2.countNonZero(pixels):
-            pixels, left, top = part, u0, v0
-    u, v, width, height = cv2.boundingRect(pixels)
-    return (u + left, v + top, width, height) if width else (0, 0, 0, 0)
+            return left, top, part.shape[1], part.shape[0]
+    return bounding_rectangle(mask)
 
 
 def intersection_over_union(first: MaskImage, second: MaskImage) -> float:
@@ -81,32 +86,24 @@ def moved_mask(mask: MaskImage, p_before: FloatArray, p_now: FloatArray, intrins
 def dilate(mask: MaskImage, radius_px: int) -> MaskImage:
     """`mask` (H, W) grown by a disc of `radius_px` pixels."""
     grown = np.zeros_like(mask)
-    region, patch = dilated_patch(mask, radius_px)
-    grown[region] = patch
+    u, v, width, height = bounding_rectangle(mask)
+    rows = slice(max(v - radius_px, 0), min(v + height + radius_px, mask.shape[0]))
+    columns = slice(max(u - radius_px, 0), min(u + width + radius_px, mask.shape[1]))
+    if width:
+        grown[rows, columns] = cv2.dilate(mask.view(np.uint8)[rows, columns], disc(radius_px)).view(np.bool_)
     return grown
 
 
-def dilated_patch(
-    mask: MaskImage, radius_px: int, expected_px: FloatArray | None = None
-) -> tuple[tuple[slice, slice], MaskImage]:
-    """The rectangle that a mask (H, W), grown by a disc of `radius_px`, lies in, and the grown mask inside it.
-
-    For `expected_px` see `bounding_rectangle`.
-    """
-    u, v, width, height = bounding_rectangle(mask, expected_px)
-    if width == 0:
-        return (slice(0, 0), slice(0, 0)), mask[:0, :0]
-    rows = slice(max(v - radius_px, 0), min(v + height + radius_px, mask.shape[0]))
-    columns = slice(max(u - radius_px, 0), min(u + width + radius_px, mask.shape[1]))
-    region = (rows, columns)
-    if radius_px == 0:
-        return region, mask[region]
-    return region, cv2.dilate(mask.view(np.uint8)[region], _disc(radius_px)).view(np.bool_)
+@cache
+def disc(radius_px: int) -> npt.NDArray[np.uint8]:
+    """(2 r + 1, 2 r + 1) 1 inside a disc, else 0."""
+    return np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius_px + 1, 2 * radius_px + 1)), np.uint8)
 
 
 @cache
-def _disc(radius_px: int) -> npt.NDArray[np.uint8]:
-    return np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius_px + 1, 2 * radius_px + 1)), np.uint8)
+def disc_half_widths(radius_px: int) -> npt.NDArray[np.intp]:
+    """(2 r + 1,) how far the same disc reaches to both sides of its middle column, row by row."""
+    return np.asarray((disc(radius_px).sum(axis=1, dtype=np.intp) - 1) // 2, np.intp)
 
 
 def _cut(mask: MaskImage, rectangle: tuple[int, int, int, int]) -> npt.NDArray[np.uint8]:

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from dotmask.geometry import inverse, transform
-from dotmask.mask_geometry import dilated_patch, moved_mask
+from dotmask.mask_geometry import disc_half_widths, enclosing_rectangle, moved_mask
+from dotmask.mask_kernels import clear_grown
 from dotmask.profiles import MaskGrowth, Profile
 from dotmask.records import DepthImage, Detections, FloatArray, Intrinsics, MaskedDepth, MaskImage, Track, TrackPhase
 
@@ -123,8 +124,8 @@ def mask_depth(depth_m: DepthImage, cutouts: Sequence[Cutout]) -> MaskedDepth:
 def _remove(depth_m: DepthImage, cutouts: Sequence[Cutout]) -> None:
     """Set `depth_m` to 0 under the grown masks, in place."""
     for cutout in cutouts:
-        region, patch = dilated_patch(cutout.mask, cutout.radius_px, cutout.box_px)
-        np.copyto(depth_m[region], 0.0, where=patch)
+        rectangle = enclosing_rectangle(cutout.mask, cutout.box_px)
+        clear_grown(depth_m, cutout.mask, *rectangle, disc_half_widths(cutout.radius_px))
 
 
 def _is_moving(track: Track) -> bool:

@@ -9,9 +9,10 @@ from rich.box import SIMPLE
 from rich.table import Table
 
 from scenarios.errors import ScenarioError
-from scenarios.report import Measured, Part, Report
+from scenarios.report import Measured, Part, Report, SegmenterReport
 from scenarios.run import RunSettings, run
 from scenarios.run_folder import RunFolder
+from scenarios.segmenters import segmenter_report
 from scenarios.spec import Scenario
 
 World = Literal["empty", "frozen", "moving"]
@@ -57,7 +58,7 @@ class Triplet(Part):
     scenario: str
     seed: int
     frames: int
-    segmenter: str
+    segmenter: SegmenterReport
     slam: str
     profile: str
     pose_feedback: str
@@ -102,7 +103,7 @@ def run_triplet(scenario: Scenario, settings: RunSettings, out: Path, advance: C
             scenario=scenario.name,
             seed=scenario.seed,
             frames=reports["moving"].frames,
-            segmenter=settings.segmenter,
+            segmenter=segmenter_report(settings.segmenter, settings.network),
             slam=settings.slam,
             profile=settings.profile,
             pose_feedback=settings.pose_feedback,
@@ -141,7 +142,7 @@ def _number(value: float | None, scale: float, sign: str = "") -> str:
 def headline(triplet: Triplet) -> str:
     """What was run, in one line."""
     return (
-        f"{triplet.scenario}, seed {triplet.seed}, {triplet.frames} frames: segmenter {triplet.segmenter}, "
+        f"{triplet.scenario}, seed {triplet.seed}, {triplet.frames} frames: segmenter {triplet.segmenter.name}, "
         f"SLAM {triplet.slam}, profile {triplet.profile}, pose feedback {triplet.pose_feedback}"
     )
 

@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 
 import sim
-from dotmask.errors import SlamError
+from dotmask.errors import SegmenterError, SlamError
+from dotmask.segmentation.networks import pytorch
 from dotmask.slam.rtabmap.library import DEPTHAI_VERSION, core
 from scenarios.run_folder import versions
 from scenarios.world import RENDERERS
@@ -102,6 +103,14 @@ def _rtabmap() -> Finding:
     return Finding(what=what, said=f"RTAB-Map {rtabmap.version} of depthai {DEPTHAI_VERSION}", is_well=True)
 
 
+def _networks() -> Finding:
+    what = "networks"
+    try:
+        return Finding(what=what, said=pytorch(), is_well=True)
+    except SegmenterError as error:
+        return Finding(what=what, said=str(error), is_well=False, is_needed=False)
+
+
 def _wall(distance_m: float) -> SceneObject:
     """A square before a camera at the origin that looks along z, far larger than the image."""
     side = 10.0 * distance_m
@@ -125,6 +134,7 @@ EXAMINATIONS: tuple[Callable[[], Finding], ...] = (
     _default_renderer,
     _second_renderer,
     _rtabmap,
+    _networks,
 )
 
 

@@ -18,14 +18,15 @@ from dotmask.atomic_file import write_atomically
 from scenarios.errors import ScenarioError
 from scenarios.run import RunSettings
 from scenarios.run_folder import versions
+from scenarios.segmenters import own_segmenter_file
 from scenarios.spec import CameraSpec, Scenario
 
 ROOT = Path(__file__).parents[1]
-NOT_MEASURED_WITH = ("scenarios/tables/", "scenarios/sweep/", "scenarios/finished_runs.py", "scenarios/cli.py")
+NOT_MEASURED_WITH = ("scenarios/tables/", "scenarios/sweep/", "scenarios/finished_runs.py", "scenarios/cli/")
 """Code that no figure depends on."""
 
 NO_INFLUENCE = ("threads", "video")
-"""Settings that change no figure but times."""
+"""Settings that change no figure but times; see `figure_settings` for what threads do to a network."""
 
 
 @cache
@@ -41,8 +42,16 @@ def code_hash() -> str:
 
 
 def figure_settings(settings: RunSettings) -> dict[str, Any]:
-    """The settings that decide the figures, by name."""
-    return {name: value for name, value in asdict(settings).items() if name not in NO_INFLUENCE}
+    """The settings that decide the figures, by name.
+
+    Of weights that is their hash, wherever they lie. With a network it is the number of threads too: sums are split
+    among them, and the last bits of the answer depend on how.
+    """
+    found = {name: value for name, value in asdict(settings).items() if name not in NO_INFLUENCE}
+    if settings.network is not None:
+        del found["network"]["weights"]
+        found["network"]["threads"] = settings.threads
+    return found
 
 
 def run_key(scenario: Scenario, settings: RunSettings) -> dict[str, Any]:
@@ -51,6 +60,7 @@ def run_key(scenario: Scenario, settings: RunSettings) -> dict[str, Any]:
         "scenario": scenario.model_dump(mode="json"),
         "trajectory": _trajectory_hash(scenario),
         "settings": figure_settings(settings),
+        "own_segmenter": _own_segmenter_hash(settings.segmenter),
         "versions": versions(),
         "code": code_hash(),
     }
@@ -65,6 +75,12 @@ def _trajectory_hash(scenario: Scenario) -> str | None:
         return hashlib.sha256(Path(camera.trajectory).read_bytes()).hexdigest()
     except OSError:
         return None
+
+
+def _own_segmenter_hash(name: str) -> str | None:
+    """SHA-256 of the file that makes a segmenter of the user's own; None with others, or where it is not found."""
+    path = own_segmenter_file(name) if ":" in name else None
+    return None if path is None else hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def run_name(key: dict[str, Any]) -> str:

@@ -1,7 +1,9 @@
 """The named scenarios."""
 
+import json
 from collections.abc import Mapping
 from types import MappingProxyType
+from typing import Any
 
 from scenarios.catalog import (
     faults,
@@ -17,8 +19,8 @@ from scenarios.catalog import (
     robot,
     smoke,
 )
-from scenarios.errors import unknown
-from scenarios.spec import Scenario
+from scenarios.errors import ScenarioError, unknown
+from scenarios.spec import Scenario, with_overrides
 
 MODULES = (
     smoke,
@@ -68,3 +70,25 @@ def scenario(name: str) -> Scenario:
     if name not in SCENARIOS:
         raise unknown("scenario", name, SCENARIOS)
     return SCENARIOS[name]
+
+
+def chosen_scenario(asked: str | Scenario, overrides: Mapping[str, Any]) -> Scenario:
+    """The scenario of that name, or the given one, with values replaced.
+
+    Args:
+        asked: a name, see `dotmask list`, or a scenario.
+        overrides: dotted keys to values, as for `dotmask run --set`.
+
+    Raises:
+        ScenarioError: no such scenario, an unknown key, or a value of the wrong type.
+    """
+    chosen = scenario(asked) if isinstance(asked, str) else asked
+    texts = {key: value if isinstance(value, str) else _json(key, value) for key, value in overrides.items()}
+    return with_overrides(chosen, texts) if texts else chosen
+
+
+def _json(key: str, value: Any) -> str:
+    try:
+        return json.dumps(value)
+    except TypeError as error:
+        raise ScenarioError(f"overrides: {key}: {error}") from error

@@ -26,15 +26,16 @@ PACKAGES = (
     "gtsam",
     "pydantic",
 )
-RTABMAP_PACKAGE = "depthai"
-"""Holds RTAB-Map; the one package that need not be there."""
+OPTIONAL_PACKAGES = ("depthai", "torch", "torchvision")
+"""Those that need not be there: RTAB-Map lies in depthai, networks run on the others."""
 
 
 def versions() -> dict[str, str]:
     """Versions of everything that can change a figure."""
     installed = {name: importlib.metadata.version(name) for name in PACKAGES}
-    with suppress(importlib.metadata.PackageNotFoundError):
-        installed[RTABMAP_PACKAGE] = importlib.metadata.version(RTABMAP_PACKAGE)
+    for name in OPTIONAL_PACKAGES:
+        with suppress(importlib.metadata.PackageNotFoundError):
+            installed[name] = importlib.metadata.version(name)
     return {
         "python": platform.python_version(),
         "machine": f"{platform.system()} {platform.machine()}",

@@ -3,19 +3,19 @@
     python -m tools.loop_table [--seeds 3] [--write] [NAME ...]
 
 A quarter of the pixels, as in `smoke`: a test of what is accepted as a loop, in less than an hour and not in a day.
+What is finished is kept in runs/loops: after an interruption the same command continues.
 """
 
 import argparse
-import tempfile
 from pathlib import Path
-
-from rich.progress import track
 
 from scenarios.registry import RENDERED_AS, SCENARIOS, scenario
 from scenarios.report import Report
-from scenarios.run import RunSettings, run
+from scenarios.run import RunSettings
 from scenarios.spec import Scenario, with_overrides
+from scenarios.sweep.cells import Cell
 from tools.doc_block import markdown_table, write_block
+from tools.finished_cells import reports
 
 PAGE = Path(__file__).parent.parent / "docs" / "slam.md"
 METHOD = "dotmask"
@@ -67,19 +67,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("names", nargs="*", metavar="NAME", help="default: all with frames of their own")
     parser.add_argument("--seeds", type=int, default=3)
-    parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--write", action="store_true", help="put the table into docs/slam.md")
     options = parser.parse_args()
     names = options.names or [name for name in SCENARIOS if RENDERED_AS[name] == name]
-    settings = RunSettings.parse(methods=METHOD, threads=options.threads)
-    rows = []
-    for name in track(names, description="scenarios"):
-        reports = []
-        for seed in range(options.seeds):
-            with tempfile.TemporaryDirectory() as folder:
-                reports.append(run(quarter(name, seed), settings, Path(folder) / "run", lambda: None))
-        rows.append(row(name, reports))
-        print(" | ".join(rows[-1]), flush=True)
+    settings = RunSettings.parse(methods=METHOD, threads=1)
+    cells = [
+        Cell(scenario=quarter(name, seed), settings=settings, varied={})
+        for name in names
+        for seed in range(options.seeds)
+    ]
+    found = reports(cells, Path("runs") / "loops")
+    rows = [row(name, found[k * options.seeds : (k + 1) * options.seeds]) for k, name in enumerate(names)]
     seeds = ", ".join(map(str, range(options.seeds)))
     text = f"Seeds {seeds}, half the width and height.\n\n{markdown_table(HEADER, rows)}"
     print(text)

@@ -2,29 +2,30 @@
 
 Examples::
 
-    python -m tools.map_table                      # the walking scenarios, their first 300 frames
-    python -m tools.map_table --frames 900 crowd   # others; prints without writing
+    python -m tools.map_table                      # the walking scenarios, whole
+    python -m tools.map_table --frames 300 crowd   # others, shorter; prints without writing
 """
 
 import argparse
-import shutil
-import tempfile
+import sys
 from pathlib import Path
 
 from rich.progress import track
 
 from scenarios.registry import scenario
 from scenarios.report import MapReport
-from scenarios.run import RunSettings, run
+from scenarios.run import RunSettings
 from scenarios.spec import with_overrides
+from scenarios.sweep.cells import Cell, Done, run_and_keep
+from scenarios.sweep.executors import cores, run_local
 from tools.doc_block import markdown_table, write_block
 
 PAGE = Path(__file__).parent.parent / "docs" / "mapping.md"
 PICTURE = PAGE.with_name("map.png")
 SCENARIOS = ("fr3_walking_xyz", "fr3_walking_static", "fr3_walking_halfsphere")
-FRAMES = 300
 HEADER = [
     "scenario",
+    "frames",
     "ghosts unmasked, %",
     "ghosts dotmask, %",
     "off by, unmasked, mm",
@@ -35,16 +36,20 @@ HEADER = [
 ]
 
 
-def mapped(name: str, frames: int, variant: str, methods: str, picture: Path | None = None) -> dict[str, MapReport]:
-    """The figures of the maps by method; the picture of the maps goes to `picture`."""
+def cell(name: str, frames: int | None, variant: str, methods: str) -> Cell:
+    """A run with maps; `varied` says which."""
     chosen = scenario(name)
-    chosen = with_overrides(chosen, {"frames": str(min(frames, chosen.frames)), "variant": variant})
-    with tempfile.TemporaryDirectory() as folder:
-        out = Path(folder) / "run"
-        report = run(chosen, RunSettings.parse(methods=methods, with_map=True), out, lambda: None)
-        if picture is not None:
-            shutil.copy(out / "map.png", picture)
-    return {method: figures.map for method, figures in report.methods.items()}
+    if frames is not None:
+        chosen = with_overrides(chosen, {"frames": str(min(frames, chosen.frames))})
+    settings = RunSettings.parse(methods=methods, with_map=True, threads=1)
+    varied = {"scenario": name, "variant": variant}
+    return Cell(scenario=with_overrides(chosen, {"variant": variant}), settings=settings, varied=varied)
+
+
+def maps(done: Done) -> dict[str, MapReport]:
+    """The figures of the maps by method."""
+    assert done.result.report is not None
+    return {method: figures.map for method, figures in done.result.report.methods.items()}
 
 
 def figure(value: float | None, scale: float, digits: int) -> str:
@@ -52,13 +57,12 @@ def figure(value: float | None, scale: float, digits: int) -> str:
     return "-" if value is None else f"{scale * value:.{digits}f}"
 
 
-def row(name: str, frames: int, picture: Path | None) -> list[str]:
+def row(name: str, frames: int, people: dict[str, MapReport], empty: MapReport) -> list[str]:
     """One line of the table."""
-    people = mapped(name, frames, "moving", "unmasked,dotmask", picture)
     unmasked, ours = people["unmasked"], people["dotmask"]
-    empty = mapped(name, frames, "empty", "dotmask")["dotmask"]
     return [
         f"`{name}`",
+        str(frames),
         figure(unmasked.ghost_fraction, 1e2, 2),
         figure(ours.ghost_fraction, 1e2, 2),
         figure(unmasked.accuracy_m, 1e3, 1),
@@ -73,18 +77,29 @@ def main() -> None:
     """Run and print; without arguments, write into the page as well."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("names", nargs="*", help=f"scenarios; default: {', '.join(SCENARIOS)}")
-    parser.add_argument("--frames", type=int, default=FRAMES, help=f"of each scenario; default: {FRAMES}")
+    parser.add_argument("--frames", type=int, help="only the first frames of each")
     options = parser.parse_args()
     names = options.names or SCENARIOS
-    is_page = not options.names and options.frames == FRAMES
-    rows = [
-        row(name, options.frames, PICTURE if is_page and name == SCENARIOS[0] else None)
-        for name in track(names, "scenarios")
+    cells = [
+        cell(name, options.frames, *rest)
+        for name in names
+        for rest in (("moving", "unmasked,dotmask"), ("empty", "dotmask"))
     ]
+    finished = {}
+    for one, done in track(run_local(run_and_keep, cells, cores()), "runs", total=len(cells)):
+        if done.result.error is not None:
+            sys.exit(f"{one.title}: {done.result.error}")
+        finished[one.varied["scenario"], one.varied["variant"]] = done
+    rows = []
+    for name in names:
+        people, empty = finished[name, "moving"], finished[name, "empty"]
+        assert people.result.report is not None
+        rows.append(row(name, people.result.report.frames, maps(people), maps(empty)["dotmask"]))
     table = markdown_table(HEADER, rows)
     print(table)
-    if is_page:
-        write_block(PAGE, "maps", "python -m tools.map_table", f"The first {FRAMES} frames of each:\n\n{table}")
+    if not options.names and options.frames is None:
+        PICTURE.write_bytes(finished[SCENARIOS[0], "moving"].files["map.png"])
+        write_block(PAGE, "maps", "python -m tools.map_table", table)
 
 
 if __name__ == "__main__":

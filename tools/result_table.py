@@ -4,19 +4,20 @@ Examples::
 
     python -m tools.result_table                       # the walking scenarios, whole
     python -m tools.result_table --frames 300 crowd    # others, shorter; prints without writing
+
+What is finished is kept in runs/results: after an interruption the same command continues.
 """
 
 import argparse
-import tempfile
 from pathlib import Path
-
-from rich.progress import track
 
 from scenarios.registry import SCENARIOS, scenario
 from scenarios.report import Report
-from scenarios.run import RunSettings, run
+from scenarios.run import RunSettings
 from scenarios.spec import with_overrides
+from scenarios.sweep.cells import Cell
 from tools.doc_block import markdown_table, write_block
+from tools.finished_cells import reports
 
 PAGE = Path(__file__).parent.parent / "README.md"
 HEADER = [
@@ -62,14 +63,14 @@ def main() -> None:
     parser.add_argument("--frames", type=int, help="only the first frames of each")
     options = parser.parse_args()
     names = options.names or [s.name for s in SCENARIOS.values() if "walking" in s.tags]
-    settings = RunSettings.parse(methods="unmasked,dotmask")
-    rows = []
-    for name in track(names, "scenarios"):
+    settings = RunSettings.parse(methods="unmasked,dotmask", threads=1)
+    cells = []
+    for name in names:
         chosen = scenario(name)
         if options.frames is not None:
             chosen = with_overrides(chosen, {"frames": str(min(options.frames, chosen.frames))})
-        with tempfile.TemporaryDirectory() as folder:
-            rows.append(row(run(chosen, settings, Path(folder) / "run", lambda: None)))
+        cells.append(Cell(scenario=chosen, settings=settings, varied={}))
+    rows = [row(report) for report in reports(cells, Path("runs") / "results")]
     table = markdown_table(HEADER, rows)
     print(table)
     if not options.names and options.frames is None:

@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from dotmask.geometry import back_project
 from dotmask.profiles import Profile
 from dotmask.records import DepthImage, Detections, FloatArray, Intrinsics, MaskImage, Observation, RgbdFrame
+from dotmask.tracking.measurement_kernels import hidden_objects, mean_depth, median_depth
 from dotmask.tracking.measurement_model import CAMERA_POINT, PixelDepth
 from dotmask.tracking.measurement_noise import (
     box_centre_variance,
@@ -20,24 +20,12 @@ from dotmask.tracking.measurement_noise import (
     median_depth_variance,
 )
 
-_BAND_PX = 8
-"""How far outside a box an occluder is looked for: past the ring without depth that sensors leave at depth edges."""
-_RIM_PX = 3
-"""Mask pixels this close to a side of the box are what that side rests on."""
-_LINES = 64
-"""So many lines across a side are looked at."""
 _SAMPLES = 4000
 """Of a box of more pixels a grid of at least so many is looked at."""
 _MEDIAN_SAMPLES = 1000
+"""For the trim, a rough median is enough."""
 _LEAST_DEPTH_M, _MOST_DEPTH_M = 1e-6, 1e6
 """What lies outside is no depth."""
-_OTHER_MARGIN_M = 0.02
-"""How much nearer another detection must be to count as an occluder."""
-
-_ACROSS_PX = np.arange(-_BAND_PX, _RIM_PX)[:, None]
-"""(A, 1) places along a line: from outside the box to inside of it."""
-_ALONG = (np.arange(_LINES) + 0.5) / _LINES
-"""(L,) places of the lines on a side, as shares of it."""
 
 
 class _Crop(NamedTuple):
@@ -55,15 +43,6 @@ class _Crop(NamedTuple):
     @property
     def slices(self) -> tuple[slice, slice]:
         return slice(self.v_start, self.v_stop), slice(self.u_start, self.u_stop)
-
-    def is_near(self, other: "_Crop", distance_px: int) -> bool:
-        """Whether fewer than so many pixels lie between the two."""
-        return (
-            self.u_start - distance_px < other.u_stop
-            and other.u_start - distance_px < self.u_stop
-            and self.v_start - distance_px < other.v_stop
-            and other.v_start - distance_px < self.v_stop
-        )
 
 
 def observe(detections: Detections, frame: RgbdFrame, profile: Profile) -> tuple[Observation, ...]:
@@ -103,9 +82,17 @@ def observe(detections: Detections, frame: RgbdFrame, profile: Profile) -> tuple
     covariances = measurement_covariances(
         p_camera, np.array(sensor_variances), model, np.array(shape_sigmas), frame.intrinsics, profile.noise
     )
-    hidden: Sequence[bool] = [False] * len(seen)
+    hidden = np.zeros(len(seen), np.bool_)
     if profile.noise.notices_hidden_sides:
-        hidden = _hidden(seen, crops, detections.masks, frame.depth_m, measured[:, 2], profile.noise.occluder_margin_m)
+        hidden = hidden_objects(
+            np.array(seen),
+            np.array(crops),
+            detections.masks,
+            frame.depth_m,
+            measured[:, 2],
+            profile.noise.occluder_margin_m,
+            _MOST_DEPTH_M,
+        )
     return tuple(
         Observation(
             position_camera=p,
@@ -114,7 +101,7 @@ def observe(detections: Detections, frame: RgbdFrame, profile: Profile) -> tuple
             detection_index=index,
             mask=detections.masks[index],
             model=model,
-            is_partial=is_partial,
+            is_partial=bool(is_partial),
         )
         for index, p, R, is_partial in zip(seen, p_camera, covariances, hidden, strict=True)
     )
@@ -153,139 +140,23 @@ def _depth(mask: MaskImage, depth_m: DepthImage, profile: Profile) -> tuple[floa
 
 def _sampled_depth(mask: MaskImage, depth_m: DepthImage, step: int, profile: Profile) -> tuple[float, float] | None:
     """As `_depth`, from every so many-th pixel of every so many-th row."""
-    if step > 1:
-        mask, depth_m = np.ascontiguousarray(mask[::step, ::step]), np.ascontiguousarray(depth_m[::step, ::step])
+    is_median = profile.measurement == "mask_centroid"
     nearest, farthest = _LEAST_DEPTH_M, _MOST_DEPTH_M
-    median, samples = None, 0
-    if profile.depth_trim_m is not None or profile.measurement == "mask_centroid":
-        # For the trim, a rough median is enough.
-        coarse = 1 if profile.measurement == "mask_centroid" else _step(mask.size, _MEDIAN_SAMPLES)
-        depths = depth_m[::coarse, ::coarse][mask[::coarse, ::coarse]]
-        depths = depths[(depths >= nearest) & (depths <= farthest)]
-        samples = len(depths)
+    if profile.depth_trim_m is not None:
+        coarse = step if is_median else step * _step(mask.size // step**2, _MEDIAN_SAMPLES)
+        middle, samples = median_depth(mask, depth_m, coarse, nearest, farthest)
         if samples:
-            median = float(np.partition(depths, samples // 2)[samples // 2])
-    if median is not None and profile.depth_trim_m is not None:
-        nearest = max(median - profile.depth_trim_m, nearest)
-        farthest = min(median + profile.depth_trim_m, farthest)
-    is_used = np.asarray(cv2.bitwise_and(cv2.inRange(depth_m, nearest, farthest), mask.view(np.uint8)), np.uint8)
-    pixels = cv2.countNonZero(is_used)
+            nearest = max(middle - profile.depth_trim_m, nearest)
+            farthest = min(middle + profile.depth_trim_m, farthest)
+    pixels, mean, spread = mean_depth(mask, depth_m, step, nearest, farthest)
     if pixels < profile.min_depth_pixels:
         return None
-    if median is not None and profile.measurement == "mask_centroid":
+    if is_median:
+        median, samples = median_depth(mask, depth_m, step, _LEAST_DEPTH_M, _MOST_DEPTH_M)
         return median, median_depth_variance(median, samples, profile.noise)
-    mean = float(cv2.mean(depth_m, is_used)[0])
-    return mean, mean_depth_variance(mean, depth_m, is_used, pixels, profile.noise)
+    return mean, mean_depth_variance(mean, spread, pixels, profile.noise)
 
 
 def _step(pixels: int, samples: int) -> int:
     """Every so many-th pixel in both directions leaves at least `samples`, or all."""
     return max(1, isqrt(pixels // samples))
-
-
-def _hidden(
-    seen: Sequence[int],
-    crops: Sequence[_Crop],
-    masks: npt.NDArray[np.bool_],
-    depth_m: DepthImage,
-    distances_m: FloatArray,
-    margin_m: float,
-) -> list[bool]:
-    """Whether the image border, or something nearer, hides a side of each of the objects `seen`.
-
-    Args:
-        seen: which detections are meant.
-        crops: of all detections.
-        masks: (N, H, W) of all detections; where two overlap, the pixel belongs to the later one.
-        depth_m: (H, W).
-        distances_m: (len(seen),) depths of the objects.
-        margin_m: how much nearer than an object something that is no detection must be to count as an occluder and not
-            as the floor before its feet; grows with the distance.
-    """
-    height, width = depth_m.shape
-    is_hidden = [True] * len(seen)
-    inside = []
-    for place, index in enumerate(seen):
-        u0, u1, v0, v1 = crop = crops[index]
-        if u0 <= 1 or v0 <= 1 or u1 >= width - 1 or v1 >= height - 1:
-            continue
-        over = [j for j, other in enumerate(crops) if j != index and not other.is_empty and crop.is_near(other, 0)]
-        if not over or not _is_covered(index, over, crop, masks, depth_m, float(distances_m[place])):
-            inside.append(place)
-    if inside:
-        within = [seen[place] for place in inside]
-        for place, answer in zip(
-            inside, _ends_behind_occluder(within, crops, masks, depth_m, distances_m[inside], margin_m), strict=True
-        ):
-            is_hidden[place] = answer
-    return is_hidden
-
-
-def _is_covered(
-    index: int,
-    over: Sequence[int],
-    crop: _Crop,
-    masks: npt.NDArray[np.bool_],
-    depth_m: DepthImage,
-    distance_m: float,
-) -> bool:
-    """Whether other detections, nearer than the object, take more of its box than the object itself."""
-    u0, u1, v0, v1 = crop
-    grid = (slice(v0, v1, 1 + (v1 - v0) // _LINES), slice(u0, u1, 1 + (u1 - u0) // _LINES))
-    own = masks[index][grid].copy()
-    others = np.zeros_like(own)
-    for j in over:
-        mask = masks[j][grid]
-        if j > index:
-            own &= ~mask
-        others |= mask
-    depths = depth_m[grid]
-    is_covered = others & ~own & (depths > 0) & (depths < distance_m)
-    return bool(np.count_nonzero(is_covered) > np.count_nonzero(own))
-
-
-def _ends_behind_occluder(
-    within: Sequence[int],
-    crops: Sequence[_Crop],
-    masks: npt.NDArray[np.bool_],
-    depth_m: DepthImage,
-    distances_m: FloatArray,
-    margin_m: float,
-) -> list[bool]:
-    """Whether most lines that reach one of the four sides of a box have something nearer right outside of it.
-
-    The four sides of all boxes are looked at together: arrays are (M, 4, A, L), L lines across each side, with A pixels
-    from `_BAND_PX` outside to `_RIM_PX` inside. What would lie outside the image is its border.
-
-    Args:
-        within: the M detections that are meant.
-        crops: of all detections.
-        masks: (N, H, W) of all detections.
-        depth_m: (H, W).
-        distances_m: (M,) depths of the objects.
-        margin_m: see `_hidden`.
-    """
-    u0, u1, v0, v1 = np.array([crops[index] for index in within]).T[:, :, None, None]
-    height, width = depth_m.shape
-    low, high = _ACROSS_PX, -1 - _ACROSS_PX
-    columns, rows = u0 + ((u1 - u0) * _ALONG).astype(np.intp), v0 + ((v1 - v0) * _ALONG).astype(np.intp)
-    left, right = width * rows + np.maximum(u0 + low, 0), width * rows + np.minimum(u1 + high, width - 1)
-    top, bottom = columns + width * np.maximum(v0 + low, 0), columns + width * np.minimum(v1 + high, height - 1)
-    places = np.stack([left, right, top, bottom], axis=1)
-    depths = depth_m.ravel().take(places)
-    outside, rim = depths[:, :, :-_RIM_PX], depths[:, :, -_RIM_PX:]
-    margins = np.empty(outside.shape, np.float32)
-    margins[:] = (margin_m + 0.02 * distances_m**2)[:, None, None, None]
-    for place, index in enumerate(within):
-        out, on = places[place, :, :-_RIM_PX], places[place, :, -_RIM_PX:]
-        is_own = masks[index].ravel().take(on)
-        for j, other in enumerate(crops):
-            if j != index and not other.is_empty and crops[index].is_near(other, _BAND_PX):
-                np.copyto(margins[place], _OTHER_MARGIN_M, where=masks[j].ravel().take(out))
-                if j > index:
-                    is_own &= ~masks[j].ravel().take(on)
-        rim[place] *= is_own & (rim[place] <= _MOST_DEPTH_M)
-    own = rim.max(axis=2, keepdims=True)
-    is_nearer = ((outside > 0) & (outside < own - margins)).any(axis=2)
-    is_hidden = 2 * np.count_nonzero(is_nearer, axis=-1) > np.count_nonzero(own[:, :, 0], axis=-1)
-    return [bool(answer) for answer in is_hidden.any(axis=1)]

@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dotmask.profiles import MeasurementNoise
-from dotmask.records import DepthImage, FloatArray, Intrinsics, MaskImage, MeasurementModel
+from dotmask.records import FloatArray, Intrinsics, MaskImage, MeasurementModel
 from dotmask.tracking.measurement_model import PixelDepth
 
 _AXES = np.arange(3)
@@ -55,25 +55,21 @@ def centroid_variance(mask: MaskImage, centroid_px: FloatArray, area_px: float, 
     return np.asarray(noise.pixel_sigma_px**2 + noise.edge_sigma_px**2 * spread / area_px**2)
 
 
-def mean_depth_variance(
-    mean_m: float, depth_m: DepthImage, is_used: npt.NDArray[np.uint8], pixels: int, noise: MeasurementNoise
-) -> float:
+def mean_depth_variance(mean_m: float, outline_spread_m2: float, pixels: int, noise: MeasurementNoise) -> float:
     """Of the mean depth, m².
 
     Args:
         mean_m: the mean.
-        depth_m: (H, W).
-        is_used: (H, W) not 0 where a depth entered the mean.
-        pixels: how many did.
+        outline_spread_m2: sum over the pixels of the outline of the squared difference of their depth from the mean.
+        pixels: how many depths entered the mean.
         noise: see MeasurementNoise.
     """
+    one = _depth_sigma(mean_m, noise) ** 2
     if not noise.averages_pixels:
-        return _depth_sigma(mean_m, noise) ** 2
-    outline = _outline(is_used)
-    mean, deviation = (float(value[0, 0]) for value in cv2.meanStdDev(depth_m, mask=outline))
-    spread = cv2.countNonZero(outline) * (deviation**2 + (mean - mean_m) ** 2)
-    one = _depth_sigma(mean_m, noise) ** 2 + _step_variance(mean_m, noise)
-    return one / pixels + noise.edge_sigma_px**2 * spread / pixels**2 + _rounding_variance(mean_m, one, noise)
+        return one
+    one += _step_variance(mean_m, noise)
+    outline = noise.edge_sigma_px**2 * outline_spread_m2 / pixels**2
+    return one / pixels + outline + _rounding_variance(mean_m, one, noise)
 
 
 def median_depth_variance(depth_m: float, pixels: int, noise: MeasurementNoise) -> float:

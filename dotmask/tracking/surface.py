@@ -18,6 +18,7 @@ import numpy.typing as npt
 from dotmask.geometry import back_project, inverse, project, transform
 from dotmask.profiles import ClassModel, MeasurementNoise, SurfaceSettings
 from dotmask.records import ColourImage, DepthImage, Detections, FloatArray, Intrinsics, RgbdFrame, SurfaceMotion
+from dotmask.tracking.surface_kernels import is_held, object_motions, owners, steady_depth
 
 _SCALE = 2
 """Points are followed in the image at half its size."""
@@ -25,9 +26,9 @@ _WINDOW_PX, _LEVELS = 11, 3
 _FLOW_STOP = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 10, 0.03)
 _MOST_DIFFERENCE = 8.0
 """Mean difference in grey levels between the surroundings of a point then and now; more, and it was not found again."""
-_BORDER = np.ones((5, 5), np.uint8)
-"""Points keep off a mask's border by two pixels of the half size image: there, the background moves with them."""
-_MARGIN_PX = _WINDOW_PX // 2 - _BORDER.shape[0] // 2
+_BORDER_PX = 2
+"""Points keep off a mask's border by so many pixels of the half size image: there, the background moves with them."""
+_MARGIN_PX = _WINDOW_PX // 2 - _BORDER_PX
 """With that, the window around a point lies in the image: at the image's border points slide."""
 _CORNER_QUALITY, _CORNER_DISTANCE_PX, _HARRIS_K = 0.001, 4, 0.04
 """By the measure of Harris and Stephens (1988), which refuses edges: a point would slide along a stripe."""
@@ -91,7 +92,7 @@ def follow(
         settings: parameters.
     """
     grey = _half_size(frame.rgb)
-    regions = [_inner_region(box, mask) for box, mask in zip(detections.boxes_px, detections.masks, strict=True)]
+    frames = _frames(detections.boxes_px, grey.shape)
     memory = settings.memory_frames
     past_s = np.full(memory, np.nan)
     pixels, owner, p_camera = np.zeros((0, 2), np.float32), np.zeros(0, np.intp), np.zeros((0, 3))
@@ -102,18 +103,19 @@ def follow(
             world = transform(T_world_camera_before, before.p_camera)
             expected = project(transform(inverse(T_world_camera), world), frame.intrinsics)
             pixels, found = _flow(before, grey, _half_pixels(expected))
-            owner = _owners(pixels, regions, grey.shape)
+            owner = owners(pixels, frames, detections.masks, _SCALE, _BORDER_PX)
             p_camera = _lift(pixels, frame.depth_m, frame.intrinsics)
             is_kept = found & (owner >= 0) & (p_camera[:, 2] > 0)
             is_kept &= np.abs(p_camera[:, 2] - before.p_camera[:, 2]) < _DEPTH_JUMP_M
             kept = np.flatnonzero(is_kept)
             pixels, owner, p_camera = pixels[kept], owner[kept], p_camera[kept]
-    counts = np.bincount(owner, minlength=len(regions)).tolist()
+    counts = np.bincount(owner, minlength=len(frames)).tolist()
     for index in _served(counts, frame.index):
-        fresh = _corners(grey, regions[index], pixels[owner == index], settings.points)
+        region = _inner_region(frames[index], detections.masks[index])
+        fresh = _corners(grey, region, pixels[owner == index], settings.points)
         if len(fresh):
             fresh_camera = _lift(fresh, frame.depth_m, frame.intrinsics)
-            is_usable = (fresh_camera[:, 2] > 0) & _is_held(grey, fresh)
+            is_usable = (fresh_camera[:, 2] > 0) & is_held(grey, fresh, _WINDOW_PX // 2, _LEAST_HOLD)
             pixels = np.concatenate([pixels, fresh[is_usable]])
             p_camera = np.concatenate([p_camera, fresh_camera[is_usable]])
             owner = np.concatenate([owner, np.full(np.count_nonzero(is_usable), index)])
@@ -157,45 +159,30 @@ def surface_motions(
         settings: parameters.
     """
     motions: list[SurfaceMotion | None] = [None] * len(models)
-    age = np.isfinite(points.past_world[:, :, 0]).sum(axis=1)
-    known = np.flatnonzero(age)
-    if not len(known):
-        return tuple(motions)
-    age, p_camera, past = age[known], points.p_camera[known], points.past_world[known]
-    owner, rows = points.detection_index[known], np.arange(len(known))
     elapsed_s = points.timestamp_s - points.past_s
-    counts = np.bincount(owner, minlength=len(models))
-
-    seen_px, past_px = _full_pixels(points.pixels[known]), _full_pixels(points.past_pixels[known])
-    thresholds = np.array([model.speed_threshold_m_s for model in models])[owner]
-    ago = np.stack([age - 1, (age - 1) // 2])  # (2, N), as all that follows from it
-    expected_px = project(transform(inverse(T_world_camera), past[rows, ago].reshape(-1, 3)), intrinsics)
-    left_px = _lengths(seen_px - expected_px.reshape(2, -1, 2))
-    speeds = left_px * p_camera[:, 2] / intrinsics.fx / elapsed_s[ago]
-    sigma_px = settings.flow_sigma_px + settings.flow_sigma_share * _lengths(seen_px - past_px[rows, ago])
-    is_moving = (~(left_px <= settings.flow_sigmas * sigma_px) & (speeds > thresholds)).any(axis=0)
-    moving = np.bincount(owner, is_moving, len(models))
-
-    lag = np.minimum(age, max(1, int(np.count_nonzero(elapsed_s <= settings.velocity_s)))) - 1
-    lags, lags_s = np.bincount(owner, lag, len(models)), np.bincount(owner, elapsed_s[lag], len(models))
+    counts, moving, lags, lags_s, middles, spreads = object_motions(
+        _full_pixels(points.pixels),
+        points.p_camera,
+        points.detection_index,
+        points.past_world,
+        _full_pixels(points.past_pixels),
+        elapsed_s,
+        np.array([model.speed_threshold_m_s for model in models], np.float64),
+        T_world_camera,
+        (intrinsics.fx, intrinsics.fy, intrinsics.cx, intrinsics.cy),
+        (settings.flow_sigma_px, settings.flow_sigma_share, settings.flow_sigmas),
+        max(1, int(np.count_nonzero(elapsed_s <= settings.velocity_s))),
+    )
     R_world_camera = T_world_camera[:3, :3]
-    velocities = (transform(T_world_camera, p_camera) - past[rows, lag]) / elapsed_s[lag, None]
-    velocities = velocities @ R_world_camera  # camera axes
-    enough = np.flatnonzero(counts >= settings.least_points)
-    if not len(enough):
-        return tuple(motions)
-    mine = _gathered(velocities, owner, counts)[enough]
-    middles = _medians(mine, counts[enough])
-    spreads = 1.4826 * _medians(np.abs(mine - middles[:, None]), counts[enough])
-    for index, middle, spread in zip(enough.tolist(), middles, spreads, strict=True):
+    for index in np.flatnonzero(counts >= max(settings.least_points, 1)).tolist():
         count = int(counts[index])
         # 1.25: a median is less efficient than a mean. The frames between two samples of one point overlap.
-        sigma = 1.25 * spread * np.sqrt((1.0 + lags[index] / count) / count)
-        floor = np.hypot(models[index].surface_sigma_m_s, noise.pose_position_sigma_m / (lags_s[index] / count))
+        sigma = 1.25 * 1.4826 * spreads[index] * np.sqrt((1.0 + lags[index]) / count)
+        floor = np.hypot(models[index].surface_sigma_m_s, noise.pose_position_sigma_m / lags_s[index])
         motions[index] = SurfaceMotion(
             points=count,
             moving_points=int(moving[index]),
-            velocity_world=R_world_camera @ middle,
+            velocity_world=R_world_camera @ middles[index],
             covariance=(R_world_camera * (sigma**2 + floor**2)) @ R_world_camera.T,
         )
     return tuple(motions)
@@ -213,26 +200,6 @@ class _Region:
 def _half_size(rgb: ColourImage) -> GreyImage:
     size = (rgb.shape[1] // _SCALE, rgb.shape[0] // _SCALE)
     return np.asarray(cv2.resize(cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY), size, interpolation=cv2.INTER_AREA), np.uint8)
-
-
-def _lengths(vectors: FloatArray) -> FloatArray:
-    """(...) of vectors (..., 2)."""
-    return np.hypot(vectors[..., 0], vectors[..., 1])
-
-
-def _gathered(values: FloatArray, owner: npt.NDArray[np.intp], counts: npt.NDArray[np.intp]) -> FloatArray:
-    """(M, K, D) the values (N, D) of each of M owners, `counts` (M,) of them, filled up with infinity."""
-    order = np.argsort(owner, kind="stable")
-    place = np.arange(len(order)) - (np.cumsum(counts) - counts)[owner[order]]
-    gathered = np.full((len(counts), int(counts.max()), values.shape[1]), np.inf)
-    gathered[owner[order], place] = values[order]
-    return gathered
-
-
-def _medians(values: FloatArray, counts: npt.NDArray[np.intp]) -> FloatArray:
-    """(M, D) of the first `counts` (M,), above 0, of values (M, K, D); the others are infinite."""
-    ordered, rows = np.sort(values, axis=1), np.arange(len(counts))
-    return np.asarray(0.5 * (ordered[rows, (counts - 1) // 2] + ordered[rows, counts // 2]))
 
 
 def _full_pixels(half: npt.NDArray[np.float32]) -> FloatArray:
@@ -278,48 +245,23 @@ def _searched(
     return np.asarray(found_at, np.float32), (np.asarray(found)[:, 0] == 1) & is_alike
 
 
-def _inner_region(box_px: FloatArray, mask: npt.NDArray[np.bool_]) -> _Region:
-    height, width = (length // _SCALE for length in mask.shape)
-    u_min, v_min, u_max, v_max = (int(place) // _SCALE for place in box_px)
-    left, top = max(u_min, _MARGIN_PX), max(v_min, _MARGIN_PX)
-    right, bottom = min(u_max, width - 1 - _MARGIN_PX), min(v_max, height - 1 - _MARGIN_PX)
+def _frames(boxes_px: FloatArray, size: tuple[int, ...]) -> npt.NDArray[np.intp]:
+    """(N, 4) first and last column, first and last row of the image of `size` (h, w) where each box may have points."""
+    within = np.clip(boxes_px, 0, _SCALE * max(size))  # a box may be far larger than any whole number
+    u_min, v_min, u_max, v_max = within.astype(np.intp).T // _SCALE
+    last_column, last_row = size[1] - 1 - _MARGIN_PX, size[0] - 1 - _MARGIN_PX
+    left, top = np.maximum(u_min, _MARGIN_PX), np.maximum(v_min, _MARGIN_PX)
+    return np.stack([left, np.minimum(u_max, last_column), top, np.minimum(v_max, last_row)], axis=1)
+
+
+def _inner_region(frame: npt.NDArray[np.intp], mask: npt.NDArray[np.bool_]) -> _Region:
+    left, right, top, bottom = frame.tolist()
     rows = slice(_SCALE * top, _SCALE * max(bottom + 1, top), _SCALE)
     columns = slice(_SCALE * left, _SCALE * max(right + 1, left), _SCALE)
     part = np.ascontiguousarray(mask[rows, columns]).view(np.uint8)
-    inside = cv2.erode(part, _BORDER, borderType=cv2.BORDER_CONSTANT, borderValue=0) if part.size else part
+    window = np.ones((2 * _BORDER_PX + 1, 2 * _BORDER_PX + 1), np.uint8)
+    inside = cv2.erode(part, window, borderType=cv2.BORDER_CONSTANT, borderValue=0) if part.size else part
     return _Region(left, top, np.asarray(inside, np.uint8))
-
-
-def _owners(pixels: npt.NDArray[np.float32], regions: Sequence[_Region], size: tuple[int, ...]) -> npt.NDArray[np.intp]:
-    """(N,) the region that each pixel of an image of `size` (h, w) lies in, the last of several; -1 for none."""
-    owners = np.full(size, -1, np.int16)
-    for index, region in enumerate(regions):
-        height, width = region.inside.shape
-        part = owners[region.top : region.top + height, region.left : region.left + width]
-        np.copyto(part, index, where=region.inside.view(np.bool_))
-    u, v = np.rint(pixels).astype(np.intp).T
-    is_in_image = (u >= 0) & (u < size[1]) & (v >= 0) & (v < size[0])
-    return np.where(is_in_image, owners.ravel().take(v * size[1] + u, mode="clip"), -1).astype(np.intp)
-
-
-def _is_held(grey: GreyImage, pixels: npt.NDArray[np.float32]) -> npt.NDArray[np.bool_]:
-    """(N,) whether the window around each pixel (N, 2) holds it in all directions: on a stripe it would slide along.
-
-    The smaller eigenvalue of the matrix of Harris and Stephens (1988), summed over the window that is searched for,
-    must be `_LEAST_HOLD` of the larger.
-    """
-    height, width = grey.shape
-    reach = _WINDOW_PX // 2 + 1
-    u, v = np.rint(pixels).astype(np.intp).T
-    u, v = np.clip(u, reach, width - 1 - reach), np.clip(v, reach, height - 1 - reach)
-    offsets = np.arange(-reach, reach + 1)
-    window = grey[(v[:, None] + offsets)[:, :, None], (u[:, None] + offsets)[:, None]].astype(np.float32)
-    across = window[:, 1:-1, 2:] - window[:, 1:-1, :-2]
-    down = window[:, 2:, 1:-1] - window[:, :-2, 1:-1]
-    xx, yy, xy = ((a * b).sum(axis=(1, 2)) for a, b in ((across, across), (down, down), (across, down)))
-    # Eigenvalues of [[xx, xy], [xy, yy]]: m -+ d.
-    m, d = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
-    return np.asarray(m - d > _LEAST_HOLD * (m + d))
 
 
 def _served(counts: Sequence[int], frame_index: int) -> set[int]:
@@ -359,19 +301,6 @@ def _corners(grey: GreyImage, region: _Region, have: npt.NDArray[np.float32], wa
 
 
 def _lift(pixels: npt.NDArray[np.float32], depth_m: DepthImage, intrinsics: Intrinsics) -> FloatArray:
-    """(N, 3) camera-frame points of pixels of the half size image; z = 0 where there is no steady depth.
-
-    The depth is the mean of the 3x3 neighbours on the same surface.
-    """
+    """(N, 3) camera-frame points of pixels of the half size image; z = 0 where there is no steady depth."""
     full = _full_pixels(pixels)
-    height, width = depth_m.shape
-    u, v = np.rint(full).astype(np.intp).T
-    u, v = np.minimum(np.maximum(u, 1), width - 2), np.minimum(np.maximum(v, 1), height - 2)
-    neighbours = (np.arange(-1, 2)[:, None] * width + np.arange(-1, 2)).reshape(-1, 1)
-    around = depth_m.ravel().take(neighbours + (v * width + u)).astype(np.float64)
-    centre = around[4]
-    is_same = (around > 0) & (np.abs(around - centre) < _DEPTH_STEP_M)
-    count = np.count_nonzero(is_same, axis=0)
-    is_steady = (count >= _LEAST_NEIGHBOURS) & (centre > 0)
-    z = np.where(is_steady, (around * is_same).sum(axis=0) / np.maximum(count, 1), 0.0)
-    return back_project(full, z, intrinsics)
+    return back_project(full, steady_depth(full, depth_m, _DEPTH_STEP_M, _LEAST_NEIGHBOURS), intrinsics)

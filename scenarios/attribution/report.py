@@ -7,7 +7,7 @@ from rich.box import SIMPLE
 from rich.table import Table
 
 from scenarios.attribution.variants import ALL_TRUE, BASELINE, STAGES, all_but, only
-from scenarios.report import Measured, MethodReport, Part
+from scenarios.report import Measured, MethodReport, Part, SegmenterReport
 
 
 class Figures(Part):
@@ -85,7 +85,7 @@ class Attribution(Part):
     seed: int
     frames: int
     renderer: str
-    segmenter: str
+    segmenter: SegmenterReport
     slam: str
     profile: str
     pose_feedback: str
@@ -142,7 +142,7 @@ def headline(attribution: Attribution) -> str:
     """What was run, in one line."""
     return (
         f"{attribution.scenario}, seed {attribution.seed}, {attribution.frames} frames: segmenter "
-        f"{attribution.segmenter}, SLAM {attribution.slam}, profile {attribution.profile}, pose feedback "
+        f"{attribution.segmenter.name}, SLAM {attribution.slam}, profile {attribution.profile}, pose feedback "
         f"{attribution.pose_feedback}"
     )
 

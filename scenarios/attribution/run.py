@@ -26,6 +26,7 @@ from scenarios.plots import Scatter, draw_scatters
 from scenarios.report import MethodReport
 from scenarios.run import RunSettings, closed_loop, one_opencv_thread
 from scenarios.run_folder import RunFolder, versions
+from scenarios.segmenters import load_segmenter, segmenter_report, segmenter_threads
 from scenarios.sources import Simulated
 from scenarios.spec import Scenario
 from sim.records import GroundTruth
@@ -80,11 +81,16 @@ def attribute(scenario: Scenario, settings: RunSettings, out: Path, advance: Cal
     profile = get_profile(settings.profile)
     if profile is ORIGINAL:
         raise ScenarioError("attribute: the profile original is another program without these stages; choose another")
-    with RunFolder(out) as folder, one_opencv_thread(), ThreadPoolExecutor(os.cpu_count()) as pool:
-        source = Simulated(scenario, settings.renderer, settings.threads)
+    source = Simulated(scenario, settings.renderer, settings.threads)
+    segmenter = load_segmenter(settings.segmenter, settings.network, source)
+    exact = OracleSegmenter()
+    with (
+        RunFolder(out) as folder,
+        one_opencv_thread(),
+        segmenter_threads(settings.network, settings.threads),
+        ThreadPoolExecutor(os.cpu_count()) as pool,
+    ):
         source.describe(folder)
-        segmenter, exact = source.oracle, OracleSegmenter()
-        assert segmenter is not None, "a simulated source has one"
         runs: tuple[VariantRun, ...] = ()
         digest = hashlib.sha256()
         for timed in source.frames():
@@ -92,7 +98,7 @@ def attribute(scenario: Scenario, settings: RunSettings, out: Path, advance: Cal
             assert isinstance(truth, GroundTruth), "a simulated source knows all"
             digest.update(frame.rgb.tobytes())
             digest.update(frame.depth_m.tobytes())
-            segmenter.show(frame.index, truth)
+            segmenter.see(frame, truth)
             exact.show(frame.index, truth)
             if not runs:
                 runs = tuple(VariantRun(v, settings, frame, truth.T_world_camera, folder.path) for v in VARIANTS)
@@ -115,7 +121,7 @@ def attribute(scenario: Scenario, settings: RunSettings, out: Path, advance: Cal
             seed=scenario.seed,
             frames=len(source),
             renderer=settings.renderer,
-            segmenter=settings.segmenter,
+            segmenter=segmenter_report(settings.segmenter, settings.network),
             slam=settings.slam,
             profile=settings.profile,
             pose_feedback=settings.pose_feedback,

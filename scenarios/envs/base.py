@@ -1,6 +1,5 @@
 """What both environments share: the scenario, its seed, the sequence of frames, lost SLAM, and the pictures."""
 
-import json
 from collections.abc import Mapping
 from typing import Any, Generic, TypeVar
 
@@ -19,7 +18,7 @@ from scenarios.envs.window import Window
 from scenarios.errors import ScenarioError, unknown
 from scenarios.faults.chain import Faults
 from scenarios.oracle import OracleSegmenter
-from scenarios.registry import scenario as named_scenario
+from scenarios.registry import chosen_scenario
 from scenarios.run import one_opencv_thread
 from scenarios.spec import Scenario, with_overrides
 from scenarios.video import PathsPanel, Picture, colour_panel, depth_panel, hidden_panel, side_by_side
@@ -35,21 +34,6 @@ FARTHEST_M = 100.0
 """No room is as large: the bound of depths and positions in the observations."""
 
 
-def chosen_scenario(scenario: str | Scenario, overrides: Mapping[str, Any]) -> Scenario:
-    """The scenario of that name, or the given one, with values replaced.
-
-    Args:
-        scenario: a name, see `dotmask list`, or a scenario.
-        overrides: dotted keys to values, as for `dotmask run --set`.
-
-    Raises:
-        ScenarioError: no such scenario, an unknown key, or a value of the wrong type.
-    """
-    chosen = named_scenario(scenario) if isinstance(scenario, str) else scenario
-    texts = {key: value if isinstance(value, str) else json.dumps(value) for key, value in overrides.items()}
-    return with_overrides(chosen, texts) if texts else chosen
-
-
 class ScenarioEnv(gymnasium.Env[Observation, Action], Generic[Action]):
     """A scenario as an episode: SLAM runs in it, frame by frame.
 
@@ -58,7 +42,7 @@ class ScenarioEnv(gymnasium.Env[Observation, Action], Generic[Action]):
 
     Args:
         scenario: a name, or a scenario.
-        overrides: see `chosen_scenario`.
+        overrides: see `scenarios.registry.chosen_scenario`.
         vary_seed: whether a reset without a seed is another world.
         lost_frames: the episode is terminated when SLAM has been lost for so many frames in a row.
         weights: of the terms of the reward.

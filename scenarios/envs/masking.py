@@ -3,51 +3,14 @@
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
 from gymnasium import spaces
 
 from dotmask.evaluation.masks import count_masking
-from dotmask.pipeline import FrontEndResult
-from dotmask.records import FloatArray, MaskedDepth, RgbdFrame
+from dotmask.records import MaskImage, RgbdFrame
 from scenarios.envs.base import Info, Observation, ScenarioEnv
 from scenarios.errors import ScenarioError
+from scenarios.given_masks import GivenMasks, Masks, checked_mask
 from scenarios.spec import Scenario
-
-Mask = npt.NDArray[Any]
-Masks = Mask | Mapping[str, Mask]
-
-
-class GivenMasks:
-    """A front end that hides what somebody else has chosen.
-
-    Attributes:
-        from_odometry: (H, W) bool, hidden from odometry in the next frame.
-        from_map: (H, W) bool, hidden from the map.
-    """
-
-    def __init__(self, shape: tuple[int, int]) -> None:
-        self.from_odometry = np.zeros(shape, np.bool_)
-        self.from_map = np.zeros(shape, np.bool_)
-
-    def step(self, frame: RgbdFrame, T_world_camera: FloatArray) -> FrontEndResult:
-        """See `dotmask.pipeline.FrontEnd`."""
-        zero = np.float32(0)
-        self._result = FrontEndResult(
-            detections=None,
-            observations=(),
-            tracks=(),
-            masked=MaskedDepth(
-                mo_mdi_m=np.where(self.from_odometry, zero, frame.depth_m),
-                mdi_m=np.where(self.from_map, zero, frame.depth_m),
-            ),
-            stage_seconds={},
-        )
-        return self._result
-
-    def refine(self, T_world_camera: FloatArray) -> FrontEndResult:
-        """Nothing depends on the pose."""
-        return self._result
 
 
 class Masking(ScenarioEnv[Any]):
@@ -116,16 +79,10 @@ class Masking(ScenarioEnv[Any]):
             self._seen = self._frame(self._index)
         return self.images(self._seen[0]), terms, is_last, info
 
-    def _given(self, action: Masks) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
+    def _given(self, action: Masks) -> tuple[MaskImage, MaskImage]:
         if self._map_mask:
             if not isinstance(action, Mapping):
                 raise ScenarioError("masking: with map_mask the action is {'odometry': mask, 'map': mask}")
-            return self._checked(action["odometry"]), self._checked(action["map"])
-        mask = self._checked(action)
+            return checked_mask(action["odometry"], self._size), checked_mask(action["map"], self._size)
+        mask = checked_mask(action, self._size)
         return mask, mask
-
-    def _checked(self, mask: Any) -> npt.NDArray[np.bool_]:
-        given = np.asarray(mask)
-        if given.shape != self._size:
-            raise ScenarioError(f"masking: a mask has the size of the image, {self._size}; got {given.shape}")
-        return np.asarray(given != 0)

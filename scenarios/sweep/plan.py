@@ -6,13 +6,14 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
+from dotmask.segmentation.networks import NETWORKS
 from scenarios.errors import ScenarioError
 from scenarios.finished_runs import run_name
 from scenarios.run import RunSettings
 from scenarios.spec import Scenario, with_overrides
 from scenarios.sweep.cells import Cell
 
-RUN_KEYS = ("segmenter", "slam", "slam_parameters", "profile", "pose_feedback", "renderer")
+RUN_KEYS = ("segmenter", "weights", "device", "slam", "slam_parameters", "profile", "pose_feedback", "renderer")
 """Settings of the run, which can be varied beside the keys of the scenario."""
 
 OTHER_WAYS = {"seed": "use --seeds or --seed", "methods": "use --methods; methods share the frames of a cell"}
@@ -149,6 +150,9 @@ def _seeds(scenario: Scenario, count: int | None, listed: str | None) -> tuple[i
 
 def _settings(methods: str | None, given: Mapping[str, str], texts: Mapping[str, str]) -> RunSettings:
     words = {**given, **{key: text.strip('"') for key, text in texts.items() if key in RUN_KEYS}}
+    if "segmenter" in texts and words["segmenter"] not in NETWORKS:
+        # Among varied segmenters, weights and device are for those that have them.
+        words = {key: word for key, word in words.items() if key not in ("weights", "device")}
     return RunSettings.parse(methods=methods, threads=1, **words)  # type: ignore[arg-type]  # all of them are texts
 
 

@@ -42,6 +42,11 @@ no network's time. The paper's figures are wall time with its network on a GPU, 
 end` leaves of them is for a network."""
 
 
+TIME_NOTE_OF_NETWORK = """\
+CPU time of one thread in ms, the mean over all frames; `segment` is the network's wall time; `-`: the stage did
+not run. The paper's figures are wall time with its network on a GPU, without SLAM and odometry."""
+
+
 def section_text(plan: TablePlan, reports: Reports) -> str:
     """The section of one back end.
 
@@ -52,7 +57,10 @@ def section_text(plan: TablePlan, reports: Reports) -> str:
     times = "once" if plan.repeats == 1 else f"{plan.repeats} times"
     settings = figure_settings(plan.settings)
     del settings["methods"], settings["with_map"], settings["rtabmap"]
+    network = settings.pop("network")
     stated = ", ".join(f"{name.replace('_', ' ')} `{value}`" for name, value in settings.items())
+    if network is not None:
+        stated += f"; weights `{network['weights_sha256'][:16]}` on {network['device']}"
     if plan.settings.rtabmap is not None:
         changed = ", ".join(f"`{name}={value}`" for name, value in plan.settings.rtabmap.parameters.items())
         stated += f"; RTAB-Map's parameters but for {changed}"
@@ -68,7 +76,7 @@ def section_text(plan: TablePlan, reports: Reports) -> str:
         "### Table III: loop closures",
         loop_table(reports),
         "### Table IV: time of a frame",
-        TIME_NOTE,
+        TIME_NOTE if network is None else TIME_NOTE_OF_NETWORK,
         time_table(reports, plan.methods),
         paper_time_table(),
     ]

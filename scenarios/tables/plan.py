@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from scenarios.registry import scenario
 from scenarios.run import METHODS as RUN_METHODS
@@ -48,6 +49,8 @@ class TablePlan:
         slam_parameters: str | None = None,
         slam_changes: Sequence[str] = (),
         segmenter: str = "oracle",
+        weights: str | Path | None = None,
+        device: str | None = None,
         profile: str = "calibrated",
         threads: int = 2,
         repeats: int | None = None,
@@ -63,6 +66,8 @@ class TablePlan:
         settings = RunSettings.parse(
             methods=",".join(methods),
             segmenter=segmenter,
+            weights=weights,
+            device=device,
             slam=slam,
             slam_parameters=slam_parameters,
             slam_changes=slam_changes,
@@ -71,7 +76,13 @@ class TablePlan:
             repeats=chosen,
         )
         return cls(
-            back_end=slam if settings.rtabmap is None else f"{slam}-{slam_parameters or 'default'}",
+            back_end="-".join(
+                [
+                    slam,
+                    *([] if settings.rtabmap is None else [slam_parameters or "default"]),
+                    *([] if segmenter == "oracle" else [segmenter.replace(":", ".")]),
+                ]
+            ),
             settings=settings,
             methods=methods,
             repeats=chosen,

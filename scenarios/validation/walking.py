@@ -1,7 +1,9 @@
 """Errors of the filter on people and chairs, with what is bias of the measurement kept apart."""
 
+from scenarios.registry import scenario
 from scenarios.validation.section import Context, Section, bounds, number
 from scenarios.validation.tables import reports_of, scenario_table
+from scenarios.validation.visible_velocity import STRIDE_S, table, visible_velocity
 
 SCENARIOS = ("fr3_walking_static", "fr3_walking_xyz", "fr3_walking_halfsphere")
 
@@ -25,6 +27,18 @@ def write(context: Context) -> str:
                     ("velocity, m/s", lambda m: number(m.ekf.velocity_rmse_m_s)),
                     ("bias", lambda m: number(m.ekf.velocity_bias_m_s)),
                 ],
+            ),
+            "How well the velocity can be known at all. Legs and arms swing with every step, and the front of a person "
+            "who turns moves otherwise than the body's centre. Differences from the velocity of the centre, m/s RMS "
+            "over the people in view, before any error of measurement: of the mean and the median velocity of visible "
+            f"points, and of the centre's own velocity averaged over two steps ({STRIDE_S:g} s, half of it in the "
+            "future). What follows the surface alone errs by the former; what follows the way of a person and not the "
+            "steps errs by the latter, even if it knew the future:",
+            table(
+                {
+                    name: visible_velocity(context.runs.shortened(scenario(name)), "person", context.advance)
+                    for name in SCENARIOS
+                }
             ),
             "Consistency on the same frames. People change their shape, chairs are half hidden, and frames of one "
             "object are not independent: these figures say how far the models are from people, not whether the "

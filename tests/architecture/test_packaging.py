@@ -1,11 +1,15 @@
 """The packages are ours, the command line is quick to start, and every record of versions is complete."""
 
+import importlib
+import importlib.metadata
 import subprocess
 import sys
 from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+
+PACKAGES = ("dotmask", "sim", "scenarios", "pytest_dotmask")
 
 HEAVY = (
     "torch",
@@ -26,8 +30,18 @@ HEAVY = (
 
 
 def test_packages_lie_under_one_root() -> None:
-    roots = {Path(find_spec(name).origin).parent.parent for name in ("dotmask", "sim", "scenarios")}
+    roots = {Path(find_spec(name).origin).parent.parent for name in PACKAGES}
     assert len(roots) == 1
+
+
+def test_pytest_is_not_to_rewrite_them_nor_to_warn_that_it_cannot() -> None:
+    for name in PACKAGES:
+        assert "PYTEST_DONT_REWRITE" in importlib.import_module(name).__doc__
+
+
+def test_the_pytest_plugin_is_registered() -> None:
+    (plugin,) = importlib.metadata.entry_points(group="pytest11", name="dotmask")
+    assert plugin.value == "pytest_dotmask.plugin"
 
 
 def test_a_foreign_sim_is_named(tmp_path: Path) -> None:

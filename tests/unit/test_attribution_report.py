@@ -18,7 +18,7 @@ from scenarios.attribution.report import (
 )
 from scenarios.attribution.steps import Step, StepMeter, correlate
 from scenarios.attribution.variants import STAGES, VARIANTS, Variant
-from scenarios.report import ConfusionReport, MaskReport, MethodReport, MocReport, StageTimes
+from scenarios.report import ConfusionReport, MaskReport, MethodReport, MocReport, SegmenterReport, StageTimes
 from sim.geometry import look_at
 from sim.records import GroundTruth, ObjectTruth
 
@@ -63,7 +63,7 @@ def test_the_tables_show_signs_and_what_was_not_measured() -> None:
         seed=0,
         frames=3,
         renderer="numba",
-        segmenter="oracle",
+        segmenter=SegmenterReport(name="oracle"),
         slam="embedded",
         profile="paper",
         pose_feedback="previous",

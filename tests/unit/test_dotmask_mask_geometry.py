@@ -7,7 +7,8 @@ from scipy import ndimage
 from dotmask.mask_geometry import (
     aligned_iou,
     bounding_rectangle,
-    dilated_patch,
+    dilate,
+    enclosing_rectangle,
     intersection_over_union,
     moved_mask,
 )
@@ -28,13 +29,6 @@ def rectangle(u0, v0, u1, v1):
 def ellipse(u, v, half_width, half_height):
     rows, columns = np.mgrid[0 : SHAPE[0], 0 : SHAPE[1]]
     return ((columns - u) / half_width) ** 2 + ((rows - v) / half_height) ** 2 <= 1
-
-
-def grown(mask, radius_px):
-    region, patch = dilated_patch(mask, radius_px)
-    whole = np.zeros_like(mask)
-    whole[region] = patch
-    return whole
 
 
 # ---- overlap ------------------------------------------------------------------------------------
@@ -103,6 +97,22 @@ def test_aligned_iou_sees_a_lifted_arm() -> None:
 def test_bounding_rectangle() -> None:
     assert bounding_rectangle(rectangle(3, 7, 12, 9)) == (3, 7, 10, 3)
     assert bounding_rectangle(NOTHING) == (0, 0, 0, 0)
+
+
+@pytest.mark.parametrize(
+    ("box_px", "expected"),
+    [
+        (None, (3, 7, 10, 3)),
+        ((2, 6, 13, 9), (2, 6, 12, 4)),
+        ((-5.5, 7, 12.4, 400), (0, 7, 13, SHAPE[0] - 7)),
+        ((4, 7, 12, 9), (3, 7, 10, 3)),
+        ((-9, -9, -4, -4), (3, 7, 10, 3)),
+    ],
+    ids=["none", "wider", "beyond_the_image", "too_narrow", "outside"],
+)
+def test_a_box_encloses_a_mask_only_if_it_holds_all_of_it(box_px, expected) -> None:
+    box = None if box_px is None else np.array(box_px, float)
+    assert enclosing_rectangle(rectangle(3, 7, 12, 9), box) == expected
 
 
 # ---- motion -------------------------------------------------------------------------------------
@@ -184,7 +194,7 @@ def test_nothing_stays_nothing_and_the_argument_stays_as_it_is() -> None:
 
 @pytest.mark.parametrize("radius", [0, 1, 2, 4, 9])
 def test_growth_is_a_disc_by_its_definition(radius) -> None:
-    whole = grown(rectangle(40, 30, 40, 30), radius)
+    whole = dilate(rectangle(40, 30, 40, 30), radius)
     v, u = np.mgrid[0 : SHAPE[0], 0 : SHAPE[1]]
     distance = np.hypot(u - 40, v - 30)
     assert whole[distance <= max(radius - 0.5, 0)].all()
@@ -198,21 +208,17 @@ def test_growth_equals_scipys_with_the_same_disc(seed, radius) -> None:
     rng = np.random.default_rng(seed)
     mask = rng.random(SHAPE) < 0.003
     mask[0, 5] = mask[-1, -1] = True
-    disc = grown(rectangle(40, 30, 40, 30), radius)[30 - radius : 31 + radius, 40 - radius : 41 + radius]
+    disc = dilate(rectangle(40, 30, 40, 30), radius)[30 - radius : 31 + radius, 40 - radius : 41 + radius]
     expected = ndimage.binary_dilation(mask, structure=disc)
-    np.testing.assert_array_equal(grown(mask, radius), expected)
+    np.testing.assert_array_equal(dilate(mask, radius), expected)
 
 
 def test_growth_stops_at_the_image_border() -> None:
-    whole = grown(rectangle(0, 0, 3, 3), 4)
+    whole = dilate(rectangle(0, 0, 3, 3), 4)
     assert whole[0, :8].all()
     assert whole[:8, 0].all()
     assert np.count_nonzero(whole) < 64
-    (rows, columns), patch = dilated_patch(rectangle(0, 0, 3, 3), 4)
-    assert (rows, columns) == (slice(0, 8), slice(0, 8))
-    assert patch.shape == (8, 8)
 
 
 def test_nothing_grows_to_nothing() -> None:
-    assert not grown(NOTHING, 4).any()
-    assert dilated_patch(NOTHING, 4)[1].size == 0
+    assert not dilate(NOTHING, 4).any()

@@ -1,11 +1,12 @@
 import itertools
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
 from dotmask.geometry import inverse, transform
-from dotmask.mask_geometry import dilated_patch, moved_mask
+from dotmask.mask_geometry import dilate, moved_mask
 from dotmask.masking import Cutout, all_cutouts, choose_cutouts, growth_px, mask_depth
 from dotmask.profiles import CALIBRATED, PAPER, MaskGrowth
 from dotmask.records import Detections, Intrinsics, Reason, Track, TrackPhase, Verdict
@@ -78,10 +79,21 @@ def test_each_mask_grows_by_its_own_radius() -> None:
     cutouts = [Cutout(mask=LEFT, radius_px=3, is_moving=True), Cutout(mask=RIGHT, radius_px=1, is_moving=True)]
     expected = np.zeros(SHAPE, bool)
     for cutout in cutouts:
-        region, patch = dilated_patch(cutout.mask, cutout.radius_px)
-        expected[region] |= patch
+        expected |= dilate(cutout.mask, cutout.radius_px)
     np.testing.assert_array_equal(mask_depth(DEPTH, cutouts).mo_mdi_m == 0, expected)
     assert not np.array_equal(expected, LEFT | RIGHT)
+
+
+@pytest.mark.parametrize("radius_px", [0, 1, 2, 5, 12])
+@pytest.mark.parametrize("with_box", [False, True])
+def test_what_is_removed_is_the_mask_dilated_by_a_disc(radius_px, with_box) -> None:
+    rng = np.random.default_rng(radius_px)
+    mask = cv2.dilate((rng.random(SHAPE) < 0.002).astype(np.uint8), np.ones((3, 5))).astype(bool)
+    mask[0, 7] = mask[-1, -1] = mask[30, 0] = True
+    box = np.array([0, 0, SHAPE[1] - 1, SHAPE[0] - 1], float) if with_box else None
+    answer = mask_depth(DEPTH, [Cutout(mask=mask, radius_px=radius_px, is_moving=False, box_px=box)])
+    np.testing.assert_array_equal(answer.mdi_m == 0, dilate(mask, radius_px))
+    np.testing.assert_array_equal(answer.mo_mdi_m, DEPTH)
 
 
 def test_the_images_do_not_depend_on_the_order_of_cutouts() -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from dotmask.profiles import CALIBRATED, PAPER
+from dotmask.tracking.measurement_kernels import mean_depth
 from dotmask.tracking.measurement_noise import (
     box_centre_variance,
     centroid_variance,
@@ -75,12 +76,11 @@ def test_over_all_radii_the_rule_for_discs_is_right() -> None:
 def test_mean_and_median_of_many_depths_err_as_predicted(depth_m) -> None:
     rng = np.random.default_rng(2)
     fine = replace(NOISE, depth_rounding_m=0.0)
-    mask, means, medians = np.full((40, 40), 255, np.uint8), [], []
+    mask, means, medians = np.ones((40, 40), bool), [], []
     for true_m in depth_m + rng.uniform(-0.1, 0.1, 1500):
         depth = noisy(np.full((40, 40), true_m), rng)
-        means.append(
-            (depth.mean(dtype=np.float64) - true_m) ** 2 / mean_depth_variance(true_m, depth, mask, 1600, fine)
-        )
+        pixels, mean, spread = mean_depth(mask, depth, 1, 0.1, 9.0)
+        means.append((mean - true_m) ** 2 / mean_depth_variance(true_m, spread, pixels, fine))
         middle = np.sort(depth.ravel())[800]
         medians.append((middle - true_m) ** 2 / median_depth_variance(true_m, 1600, fine))
     # The mean of 1500 squares of unit normals: 1 with a sigma of 0.037; the outline's share is a few percent.
@@ -95,14 +95,13 @@ def test_a_deep_object_whose_outline_is_far_away_has_an_uncertain_mean() -> None
     errors = []
     for centre, disc in discs(800, 41.7):
         errors.append((2.0 + radius * ((U - centre[0]) ** 2 + (V - centre[1]) ** 2) / 41.7**2)[disc].mean())
-    is_used, pixels = mask.astype(np.uint8) * 255, int(mask.sum())
-    one = mean_depth_variance(float(bowl[mask].mean()), bowl, is_used, pixels, noise)
+    pixels, mean, spread = mean_depth(mask, bowl, 1, 0.1, 9.0)
+    one = mean_depth_variance(mean, spread, pixels, noise)
     # One radius: see Gauss's circle problem above.
     assert one == pytest.approx(np.var(errors), rel=0.6)
 
 
 def test_without_averaging_the_depth_is_as_uncertain_as_that_of_one_pixel() -> None:
-    mask, depth = np.full((40, 40), 255, np.uint8), np.full((40, 40), 2.0, np.float32)
     expected = (0.02 + 0.0019 * 1.6**2) ** 2
-    assert mean_depth_variance(2.0, depth, mask, 1600, PAPER.noise) == pytest.approx(expected)
+    assert mean_depth_variance(2.0, 0.1, 1600, PAPER.noise) == pytest.approx(expected)
     assert median_depth_variance(2.0, 1600, PAPER.noise) == pytest.approx(expected)

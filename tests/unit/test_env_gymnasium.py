@@ -18,9 +18,9 @@ from dotmask.pipeline import ClosedLoop, DotMask
 from dotmask.profiles import profile
 from dotmask.slam.embedded import EmbeddedSlam
 from scenarios.bridge import intrinsics_from_camera, rgbd_frame_from_sim
-from scenarios.envs.base import chosen_scenario
 from scenarios.errors import ScenarioError
 from scenarios.oracle import OracleSegmenter
+from scenarios.registry import chosen_scenario
 from scenarios.spec import scenario_from_json
 from scenarios.world import build_simulator
 

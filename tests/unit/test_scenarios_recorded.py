@@ -1,7 +1,9 @@
 """`dotmask run` on a recorded folder: contracts of the command line, and what is left in the run folder."""
 
+import csv
 import json
 import shutil
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -68,7 +70,7 @@ def test_the_report_says_what_does_not_apply(recording: Path, tmp_path: Path, do
         "trajectory_unmasked.txt", "trajectory_unmasked_optimised.txt", "versions.json", "video.mp4",
     ]  # fmt: skip
     report = Report.model_validate_json((tmp_path / "run" / "report.json").read_text())
-    assert (report.scenario, report.seed, report.renderer, report.segmenter) == ("noise", None, None, "none")
+    assert (report.scenario, report.seed, report.renderer, report.segmenter.name) == ("noise", None, None, "none")
     assert report.frames == 4
     assert list(report.methods) == ["unmasked"]
     unmasked = report.methods["unmasked"]
@@ -76,6 +78,31 @@ def test_the_report_says_what_does_not_apply(recording: Path, tmp_path: Path, do
     facts = json.loads((tmp_path / "run" / "recording.json").read_text())
     assert facts["world"] == "groundtruth.txt"
     assert facts["camera"]["intrinsics"]["fx"] == 300.0
+
+
+def test_a_segmenter_of_ones_own_masks_a_recorded_folder(
+    recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, dotmask
+) -> None:
+    (tmp_path / "halves.py").write_text(
+        "import numpy as np\n"
+        "from dotmask.records import Detections\n"
+        "class Left:\n"
+        "    def segment(self, frame):\n"
+        "        mask = np.zeros((1, *frame.depth_m.shape), bool)\n"
+        "        mask[:, :, :160] = True\n"
+        "        box = np.array([[0, 0, 159, 239]], float)\n"
+        "        return Detections(masks=mask, boxes_px=box, class_names=('person',), scores=np.ones(1))\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    done = dotmask("run", recording, "--segmenter", "halves:Left", "--out", tmp_path / "run", "--json")
+    assert done.code == 0, done.err
+    report = Report.model_validate_json(done.out)
+    assert list(report.methods) == ["unmasked", "mdi", "dotmask"], "there is no oracle to stand beside"
+    assert report.segmenter.name == "halves:Left"
+    assert report.methods["dotmask"].time_ms.segment is not None
+    with (tmp_path / "run" / "frames.csv").open() as file:
+        assert {row["detections"] for row in csv.DictReader(file) if row["method"] != "unmasked"} == {"1"}
 
 
 def test_without_truth_the_world_is_the_first_camera(recording: Path, tmp_path: Path, dotmask) -> None:

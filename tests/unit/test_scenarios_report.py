@@ -11,6 +11,7 @@ from scenarios.report import (
     MethodReport,
     MocReport,
     Report,
+    SegmenterReport,
     StageTimes,
     TrackingReport,
     WorldTimes,
@@ -49,7 +50,7 @@ REPORT = Report(
     seed=0,
     frames=10,
     renderer="numba",
-    segmenter="oracle",
+    segmenter=SegmenterReport(name="oracle"),
     slam="embedded",
     profile="paper",
     frame_hash="ab" * 32,
@@ -160,3 +161,15 @@ def test_a_recorded_sequence_has_neither_seed_nor_renderer() -> None:
     assert (tree["seed"], tree["renderer"], tree["time_ms"]) == (None, None, {"render": None})
     assert table(recorded).title == "smoke, 10 frames: segmenter oracle, SLAM embedded, profile paper"
     assert times(recorded).startswith("ms per frame: CPU of unmasked: odometry 12.0")
+
+
+def test_the_time_of_a_network_is_told_once() -> None:
+    fed = DOTMASK.model_copy(update={"time_ms": StageTimes(segment=1187.0, track=2.0, odometry=12.0)})
+    told = DOTMASK.model_copy(update={"time_ms": StageTimes(segment=0.1, track=2.0, odometry=12.0)})
+    report = REPORT.model_copy(
+        update={
+            "segmenter": SegmenterReport(name="yolact", weights_sha256="ab" * 32, device="cpu"),
+            "methods": {"dotmask-oracle": told, "dotmask": fed},
+        }
+    )
+    assert times(report).startswith("ms per frame: render 20.0 (wall); yolact 1187.0 (wall); CPU of dotmask-oracle: ")

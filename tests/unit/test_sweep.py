@@ -15,7 +15,7 @@ import pytest
 
 from scenarios.errors import ScenarioError
 from scenarios.registry import scenario
-from scenarios.report import MethodReport, Report, StageTimes, WorldTimes
+from scenarios.report import MethodReport, Report, SegmenterReport, StageTimes, WorldTimes
 from scenarios.spec import scenario_from_json
 from scenarios.sweep import page
 from scenarios.sweep.cells import Cell, CellResult, Done
@@ -54,7 +54,7 @@ def stub(cell: Cell) -> Done:
         seed=cell.scenario.seed,
         frames=cell.scenario.frames,
         renderer="numba",
-        segmenter="oracle",
+        segmenter=SegmenterReport(name="oracle"),
         slam="embedded",
         profile="calibrated",
         frame_hash=cell.name,

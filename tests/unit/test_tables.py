@@ -9,7 +9,7 @@ import pytest
 from scenarios import finished_runs
 from scenarios.errors import ScenarioError
 from scenarios.registry import SCENARIOS
-from scenarios.report import LoopReport, MapReport, MethodReport, Report, StageTimes, WorldTimes
+from scenarios.report import LoopReport, MapReport, MethodReport, Report, SegmenterReport, StageTimes, WorldTimes
 from scenarios.run import METHODS, RunSettings, method_of
 from scenarios.tables import measure as measuring
 from scenarios.tables import page
@@ -51,7 +51,7 @@ def report(name: str = "fr3_walking_xyz", frames: int = 100, **methods: MethodRe
         seed=0,
         frames=frames,
         renderer="numba",
-        segmenter="oracle",
+        segmenter=SegmenterReport(name="oracle"),
         slam="embedded",
         profile="calibrated",
         frame_hash="00",

@@ -1,0 +1,161 @@
+"""The loss that the networks learn by (YOLACT, section "Losses"; boxes and classes as in SSD)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from dotmask.segmentation.yolact.anchors import CENTRE_VARIANCE, SIZE_VARIANCE
+from dotmask.segmentation.yolact.fast_nms import box_ious
+from dotmask.segmentation.yolact.network import Answer
+
+CLASS_WEIGHT, BOX_WEIGHT, MASK_WEIGHT, SEMANTIC_WEIGHT = 1.0, 1.5, 6.125, 1.0
+
+POSITIVE_IOU, NEGATIVE_IOU = 0.5, 0.4
+"""An anchor stands for a box with a larger IoU than the first, and for none if its IoU with all is below the second."""
+
+NEGATIVES_A_POSITIVE = 3
+"""So many anchors without a box count for each with one: those that are most wrong (online hard example mining)."""
+
+MOST_MASKS = 100
+"""So many masks of an image count at most, chosen at random."""
+
+IGNORED = -1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Target:
+    """What is to be found in one image.
+
+    Attributes:
+        boxes: (N, 4) `x1, y1, x2, y2`, shares of the image.
+        classes: (N,) int64, the first class is 0.
+        masks: (N, h, w) float32 in 0..1, of any size.
+    """
+
+    boxes: Tensor
+    classes: Tensor
+    masks: Tensor
+
+
+class Losses(NamedTuple):
+    """Scalars, weighted; their sum is the loss."""
+
+    classes: Tensor
+    boxes: Tensor
+    masks: Tensor
+    semantic: Tensor
+
+
+def encode(boxes: Tensor, anchors: Tensor) -> Tensor:
+    """Offsets (..., 4) from anchors (..., 4) to boxes (..., 4); `decode` leads back."""
+    centres, sizes = (boxes[..., :2] + boxes[..., 2:]) / 2, boxes[..., 2:] - boxes[..., :2]
+    shifts = (centres - anchors[..., :2]) / (CENTRE_VARIANCE * anchors[..., 2:])
+    return torch.cat([shifts, torch.log(sizes / anchors[..., 2:]) / SIZE_VARIANCE], dim=-1)
+
+
+def match(anchors: Tensor, target: Target) -> tuple[Tensor, Tensor]:
+    """Which box each anchor stands for, and what class it should tell.
+
+    Every box has the anchor that overlaps it most, whatever the overlap.
+
+    Args:
+        anchors: (A, 4) centre and size.
+        target: of an image.
+
+    Returns:
+        (A,) index of the box; and (A,) class with background as 0, or `IGNORED`.
+    """
+    if not len(target.boxes):
+        nothing = torch.zeros(len(anchors), dtype=torch.int64, device=anchors.device)
+        return nothing, nothing
+    corners = torch.cat([anchors[:, :2] - anchors[:, 2:] / 2, anchors[:, :2] + anchors[:, 2:] / 2], dim=1)
+    ious = box_ious(target.boxes, corners)
+    overlap, box = ious.max(dim=0)
+    for _ in range(len(target.boxes)):
+        # The best pair of a box and an anchor that have no one yet.
+        best = int(ious.argmax())
+        row, column = divmod(best, ious.shape[1])
+        box[column], overlap[column] = row, 2.0
+        ious[row, :], ious[:, column] = -1.0, -1.0
+    told = target.classes[box] + 1
+    told[overlap <= POSITIVE_IOU] = IGNORED
+    told[overlap < NEGATIVE_IOU] = 0
+    return box, told
+
+
+def yolact_loss(answer: Answer, targets: Sequence[Target], anchors: Tensor) -> Losses:
+    """The loss of a batch.
+
+    Args:
+        answer: of a network in training.
+        targets: one for each image.
+        anchors: (A, 4) of the network.
+    """
+    assert answer.semantic is not None, "the network is in evaluation"
+    matched = [match(anchors, target) for target in targets]
+    positives = max(sum(int((told > 0).sum()) for _, told in matched), 1)
+    zero = answer.logits.sum() * 0
+    of_classes, of_boxes, of_masks, of_semantic = zero, zero, zero, zero
+    for index, (target, (box, told)) in enumerate(zip(targets, matched, strict=True)):
+        is_positive = told > 0
+        of_classes = of_classes + _class_loss(answer.logits[index], told)
+        wanted = encode(target.boxes[box[is_positive]], anchors[is_positive])
+        of_boxes = of_boxes + functional.smooth_l1_loss(answer.offsets[index, is_positive], wanted, reduction="sum")
+        of_masks = of_masks + _mask_loss(
+            answer.prototypes[index], answer.coefficients[index, is_positive], target, box[is_positive]
+        )
+        of_semantic = of_semantic + _semantic_loss(answer.semantic[index], target)
+    return Losses(
+        CLASS_WEIGHT * of_classes / positives,
+        BOX_WEIGHT * of_boxes / positives,
+        MASK_WEIGHT * of_masks / positives,
+        SEMANTIC_WEIGHT * of_semantic / len(targets),
+    )
+
+
+def _class_loss(logits: Tensor, told: Tensor) -> Tensor:
+    """Sum of the cross entropy over the positives and the hardest negatives of one image."""
+    is_positive, is_negative = told > 0, told == 0
+    # How wrong a negative is: minus the logarithm of the probability of background.
+    wrong = torch.logsumexp(logits, dim=1) - logits[:, 0]
+    count = min(NEGATIVES_A_POSITIVE * int(is_positive.sum()), int(is_negative.sum()))
+    hardest = wrong.detach().masked_fill(~is_negative, -1.0).topk(count).indices
+    positive = functional.cross_entropy(logits[is_positive], told[is_positive], reduction="sum")
+    return positive + wrong[hardest].sum()
+
+
+def _mask_loss(prototypes: Tensor, coefficients: Tensor, target: Target, box: Tensor) -> Tensor:
+    """Sum over the positives of the mean cross entropy inside the true box."""
+    if not len(box):
+        return prototypes.sum() * 0
+    scale = 1.0
+    if len(box) > MOST_MASKS:
+        chosen = torch.randperm(len(box), device=box.device)[:MOST_MASKS]
+        scale, coefficients, box = len(box) / MOST_MASKS, coefficients[chosen], box[chosen]
+    height, width = prototypes.shape[:2]
+    wanted = (_resized(target.masks, height, width) > 0.5).float()[box]
+    logits = (prototypes @ coefficients.T).permute(2, 0, 1)
+    wrong = functional.binary_cross_entropy_with_logits(logits, wanted, reduction="none")
+    left, top, right, bottom = (target.boxes[box] * wanted.new_tensor([width, height, width, height])).T[:, :, None]
+    y, x = torch.arange(height, device=box.device), torch.arange(width, device=box.device)
+    in_box = ((y >= top - 1) & (y < bottom + 1))[:, :, None] & ((x >= left - 1) & (x < right + 1))[:, None, :]
+    area = ((right - left) * (bottom - top))[:, 0].clamp(min=1.0)
+    summed: Tensor = scale * ((wrong * in_box).sum(dim=(1, 2)) / area).sum()
+    return summed
+
+
+def _semantic_loss(logits: Tensor, target: Target) -> Tensor:
+    """Sum over the classes of the mean cross entropy; a pixel may be of several classes."""
+    wanted = torch.zeros_like(logits)
+    if len(target.masks):
+        for class_index, mask in zip(target.classes.tolist(), _resized(target.masks, *logits.shape[1:]), strict=True):
+            wanted[class_index] = torch.maximum(wanted[class_index], (mask > 0.5).to(wanted.dtype))
+    return functional.binary_cross_entropy_with_logits(logits, wanted, reduction="none").mean(dim=(1, 2)).sum()
+
+
+def _resized(masks: Tensor, height: int, width: int) -> Tensor:
+    return functional.interpolate(masks[None], (height, width), mode="bilinear", align_corners=False)[0]

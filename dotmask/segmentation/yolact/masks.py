@@ -1,0 +1,43 @@
+"""Masks as combinations of prototypes (YOLACT, section "Mask Assembly")."""
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+import torch
+from torch import Tensor
+
+CROP_MARGIN_PX = 1.0
+"""A mask may reach beyond its box by so many pixels of the prototypes."""
+
+THRESHOLD = 0.5
+"""A pixel belongs to a mask above it."""
+
+
+def assemble(prototypes: Tensor, coefficients: Tensor, boxes: Tensor) -> Tensor:
+    """Masks (N, h, w) in 0..1, and 0 outside of their boxes.
+
+    Args:
+        prototypes: (h, w, K).
+        coefficients: (N, K).
+        boxes: (N, 4) `x1, y1, x2, y2`, shares of the image.
+    """
+    masks = torch.sigmoid(prototypes @ coefficients.T).permute(2, 0, 1)
+    height, width = masks.shape[1:]
+    x = torch.arange(width, device=masks.device, dtype=boxes.dtype)
+    y = torch.arange(height, device=masks.device, dtype=boxes.dtype)
+    left, top, right, bottom = (boxes * boxes.new_tensor([width, height, width, height])).T[:, :, None]
+    in_columns = (x >= left - CROP_MARGIN_PX) & (x < right + CROP_MARGIN_PX)
+    in_rows = (y >= top - CROP_MARGIN_PX) & (y < bottom + CROP_MARGIN_PX)
+    cropped: Tensor = masks * (in_rows[:, :, None] & in_columns[:, None, :])
+    return cropped
+
+
+def full_size(masks: npt.NDArray[np.float32], height: int, width: int) -> npt.NDArray[np.bool_]:
+    """Masks (N, h, w) in 0..1, stretched bilinearly to the image, as masks (N, height, width) of bool.
+
+    OpenCV does it several times faster than PyTorch on a CPU, and with a GPU less is copied from it.
+    """
+    stretched = np.zeros((len(masks), height, width), np.bool_)
+    for whole, mask in zip(stretched, masks, strict=True):
+        np.greater(cv2.resize(mask, (width, height), interpolation=cv2.INTER_LINEAR), THRESHOLD, out=whole)
+    return stretched

@@ -1,0 +1,5 @@
+"""`python -m scenarios.cli` is `dotmask`."""
+
+from scenarios.cli import main
+
+main()

@@ -1,0 +1,79 @@
+"""COCO's average precision of masks, by pycocotools."""
+
+import contextlib
+import os
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from pycocotools import mask as coco_mask
+from pycocotools.coco import COCO
+from pycocotools.cocoeval import COCOeval
+
+from dotmask.records import Detections, MaskImage
+
+
+class AveragePrecision:
+    """Collects true and found masks of many images; masks are kept as run lengths.
+
+    Args:
+        class_names: the classes that are judged.
+    """
+
+    def __init__(self, class_names: Sequence[str]) -> None:
+        self._numbers = {name: number for number, name in enumerate(class_names, start=1)}
+        self._images: list[dict[str, Any]] = []
+        self._true: list[dict[str, Any]] = []
+        self._found: list[dict[str, Any]] = []
+
+    def see(self, size: tuple[int, int], true: Iterable[tuple[str, MaskImage, bool]], found: Detections) -> None:
+        """Add an image.
+
+        Args:
+            size: height and width.
+            true: class, mask (H, W) and whether it counts, of every instance of a class that is judged. One that does
+                not count is neither to be found nor is finding it wrong.
+            found: of any class and score.
+        """
+        image = len(self._images) + 1
+        self._images.append({"id": image, "height": size[0], "width": size[1]})
+        for class_name, mask, counts in true:
+            # COCO calls what does not count a crowd.
+            self._true.append(
+                self._annotation(image, class_name, mask, len(self._true) + 1) | {"iscrowd": int(not counts)}
+            )
+        for class_name, mask, score in zip(found.class_names, found.masks, found.scores.tolist(), strict=True):
+            if class_name in self._numbers:
+                self._found.append(self._annotation(image, class_name, mask, len(self._found) + 1) | {"score": score})
+
+    def by_class(self) -> dict[str, tuple[float | None, float | None]]:
+        """AP (mean over the IoU 0.5 to 0.95) and AP50 of each class; None where there is nothing to be found."""
+        with open(os.devnull, "w", encoding="utf-8") as nowhere, contextlib.redirect_stdout(nowhere):
+            evaluation = COCOeval(self._coco(self._true), self._coco(self._found), "segm")
+            evaluation.evaluate()
+            evaluation.accumulate()
+        # IoU, recall, class, area (the first is all), number of detections (the last is 100)
+        precision: npt.NDArray[np.float64] = evaluation.eval["precision"][:, :, :, 0, -1]
+        return {name: (_mean(precision[:, :, n]), _mean(precision[0, :, n])) for n, name in enumerate(self._numbers)}
+
+    def _annotation(self, image: int, class_name: str, mask: MaskImage, number: int) -> dict[str, Any]:
+        return {
+            "id": number,
+            "image_id": image,
+            "category_id": self._numbers[class_name],
+            "segmentation": coco_mask.encode(np.asfortranarray(mask.view(np.uint8))),
+            "area": int(np.count_nonzero(mask)),
+        }
+
+    def _coco(self, annotations: list[dict[str, Any]]) -> Any:
+        made = COCO()
+        categories = [{"id": number, "name": name} for name, number in self._numbers.items()]
+        made.dataset = {"images": self._images, "categories": categories, "annotations": annotations}
+        made.createIndex()
+        return made
+
+
+def _mean(precision: npt.NDArray[np.float64]) -> float | None:
+    known = precision[precision > -1]
+    return float(known.mean()) if known.size else None
