@@ -9,6 +9,7 @@ import logging
 import multiprocessing
 import os
 import signal
+import socket
 import threading
 import time
 from collections import deque
@@ -33,6 +34,9 @@ ONE_THREAD = {
 
 RETRIES = 3
 """How often Ray starts a cell anew whose machine or process was lost."""
+
+ANSWER_S = 5.0
+"""How long a cluster may take to answer."""
 
 GRACE_S = 5.0
 """How long a run may take to clean up when it is stopped."""
@@ -130,6 +134,23 @@ def _no_interrupt() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
+def _check_answers(address: str) -> None:
+    """Refuse a `host:port` where nobody listens: Ray itself gives up after minutes.
+
+    Raises:
+        ScenarioError: nobody does.
+    """
+    host, _, port = address.removeprefix("ray://").rpartition(":")
+    if not host or not port.isdigit():
+        return  # "auto", or what Ray will complain about at once
+    try:
+        socket.create_connection((host, int(port)), ANSWER_S).close()
+    except (OSError, OverflowError) as error:
+        raise ScenarioError(
+            f"--address {address}: nobody answers there ({error}); start a cluster with: ray start --head"
+        ) from error
+
+
 def run_ray(work: Work, cells: Sequence[Cell], address: str | None) -> Executed:
     """Every cell as a task of one core in a new process of a Ray cluster, which schedules and retries it.
 
@@ -145,6 +166,8 @@ def run_ray(work: Work, cells: Sequence[Cell], address: str | None) -> Executed:
         import ray
     except ImportError:
         raise ScenarioError("--executor ray: Ray is not installed; pip install 'dotmask[ray]'") from None
+    if address is not None:
+        _check_answers(address)
     try:
         ray.init(
             address=address or "local",

@@ -1,6 +1,7 @@
 """Sweeps of real runs: killed and continued, and on a local Ray cluster."""
 
 import os
+import socket
 import subprocess
 import sys
 import time
@@ -11,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from scenarios.errors import ScenarioError
 from scenarios.registry import scenario
 from scenarios.run import RunSettings, run
 from scenarios.spec import Scenario, with_overrides
@@ -90,3 +92,28 @@ def test_ray_gives_the_same_table(uninterrupted: list[dict], tmp_path: Path, mon
     monkeypatch.setenv("PYTHONPATH", str(ROOT), prepend=os.pathsep)
     sweep(whole_plan(), tmp_path / "out", partial(run_ray, run_cell, address=None))
     assert without_times(tmp_path / "out") == uninterrupted
+
+
+@pytest.mark.skipif(find_spec("ray") is None, reason="needs Ray: pip install 'dotmask[ray]'")
+@pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::FutureWarning", "ignore::DeprecationWarning")
+def test_so_does_a_ray_cluster_that_runs_already(
+    uninterrupted: list[dict], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from ray.cluster_utils import Cluster
+
+    monkeypatch.setenv("PYTHONPATH", str(ROOT), prepend=os.pathsep)
+    cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 2, "include_dashboard": False})
+    try:
+        sweep(whole_plan(), tmp_path / "out", partial(run_ray, run_cell, address=cluster.address))
+    finally:
+        cluster.shutdown()
+    assert without_times(tmp_path / "out") == uninterrupted
+
+
+@pytest.mark.skipif(find_spec("ray") is None, reason="needs Ray: pip install 'dotmask[ray]'")
+def test_an_address_where_nobody_listens_is_refused_at_once(tmp_path: Path) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))  # and never listens
+        address = f"127.0.0.1:{taken.getsockname()[1]}"
+        with pytest.raises(ScenarioError, match=f"--address {address}: nobody answers there"):
+            sweep(whole_plan(), tmp_path / "out", partial(run_ray, run_cell, address=address))
