@@ -92,7 +92,8 @@ def read_table(path: Path) -> list[Row]:
         ScenarioError: it cannot be read.
     """
     try:
-        rows: list[Row] = pq.read_table(io.BytesIO(path.read_bytes())).to_pylist()
+        # Without threads: a process that ends soon after them is aborted by Arrow, as of version 26.
+        rows: list[Row] = pq.read_table(io.BytesIO(path.read_bytes()), use_threads=False).to_pylist()
     except (OSError, pa.ArrowException) as error:
         raise ScenarioError(f"{path}: cannot be read ({error}); run `dotmask sweep` first") from error
     return rows

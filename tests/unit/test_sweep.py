@@ -173,6 +173,14 @@ def test_rows_are_in_the_order_of_the_plan_and_carry_everything(tmp_path: Path) 
     assert repeated == plan().cells[0].scenario, "a row is enough to repeat its run"
 
 
+def test_a_program_may_end_as_soon_as_it_has_read_a_table(tmp_path: Path) -> None:
+    sweep(plan(), tmp_path / "out", inline)
+    table = str(tmp_path / "out" / "table.parquet")
+    code = f"from pathlib import Path\nfrom scenarios.sweep.table import read_table\nread_table(Path({table!r}))"
+    for _ in range(3):
+        subprocess.run([sys.executable, "-c", code], check=True)
+
+
 def test_a_failed_cell_is_a_row_with_its_error_and_is_not_run_again(tmp_path: Path) -> None:
     sweep(plan(seeds=2), tmp_path / "out", inline)
     failed = [r for r in read_table(tmp_path / "out" / "table.parquet") if r["error"] is not None]
