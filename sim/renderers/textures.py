@@ -26,29 +26,37 @@ class TextureAtlas:
     @classmethod
     def of(cls, images: Iterable[npt.NDArray[np.uint8]]) -> "TextureAtlas":
         """Pack square uint8 RGB images (S, S, 3), S a power of two. Each mip level is the 2x2 mean of the last."""
-        levels: list[npt.NDArray[np.uint32]] = []
-        offsets, sizes, total = [], [], 0
-        for image in images:
-            offsets.append(total)
-            sizes.append(image.shape[0])
-            level = image.astype(np.int32)
+        images = list(images)
+        sizes = np.array([len(image) for image in images], np.int32)
+        lengths = [(4 * size * size - 1) // 3 for size in sizes.tolist()]  # of all levels
+        offsets = np.cumsum([0, *lengths])
+        texels = np.empty(offsets[-1], np.uint32)
+        for image, offset in zip(images, offsets.tolist(), strict=False):
+            # Two channels in one number, with room for the sum of four.
+            red_blue = image[..., 0] | image[..., 2].astype(np.uint32) << 16
+            green = image[..., 1].astype(np.uint32)
+            first = offset
             while True:
-                levels.append(_tiled(level[..., 0] | level[..., 1] << 8 | level[..., 2] << 16))
-                total += levels[-1].size
-                if len(level) == 1:
+                last = first + green.size
+                _put_tiles(red_blue | green << 8, texels[first:last])
+                if len(green) == 1:
                     break
-                rows = level[::2] + level[1::2]
-                level = (rows[:, ::2] + rows[:, 1::2] + 2) >> 2
-        return cls(
-            texels=np.concatenate(levels) if levels else np.zeros(0, np.uint32),
-            offsets=np.array(offsets, np.int32),
-            sizes=np.array(sizes, np.int32),
-        )
+                first = last
+                red_blue, green = _halved(red_blue) & 0x00FF00FF, _halved(green) & 0xFF
+        return cls(texels=texels, offsets=offsets[:-1].astype(np.int32), sizes=sizes)
 
 
-def _tiled(level: npt.NDArray[np.int32]) -> npt.NDArray[np.uint32]:
+def _halved(level: npt.NDArray[np.uint32]) -> npt.NDArray[np.uint32]:
+    """The rounded means of 2x2 texels (S / 2, S / 2); in each upper half bits are left over from the next."""
+    rows = level[::2] + level[1::2]
+    return (rows[:, ::2] + rows[:, 1::2] + 0x00020002) >> 2
+
+
+def _put_tiles(level: npt.NDArray[np.uint32], texels: npt.NDArray[np.uint32]) -> None:
     """Texels (S, S) in the order of `TextureAtlas.texels`."""
-    if len(level) >= 4:
-        tiles = len(level) // 4
-        level = level.reshape(tiles, 2, 2, tiles, 2, 2).transpose(0, 3, 1, 4, 2, 5)
-    return level.astype(np.uint32).ravel()
+    if len(level) < 4:
+        texels[:] = level.ravel()
+        return
+    tiles = len(level) // 4
+    ordered = level.reshape(tiles, 2, 2, tiles, 2, 2).transpose(0, 3, 1, 4, 2, 5)
+    texels.reshape(ordered.shape)[:] = ordered
