@@ -49,7 +49,7 @@ class TextureAtlas:
 def _halved(level: npt.NDArray[np.uint32]) -> npt.NDArray[np.uint32]:
     """The rounded means of 2x2 texels (S / 2, S / 2); in each upper half bits are left over from the next."""
     rows = level[::2] + level[1::2]
-    return (rows[:, ::2] + rows[:, 1::2] + 0x00020002) >> 2
+    return np.asarray((rows[:, ::2] + rows[:, 1::2] + 0x00020002) >> 2, np.uint32)
 
 
 def _put_tiles(level: npt.NDArray[np.uint32], texels: npt.NDArray[np.uint32]) -> None:
