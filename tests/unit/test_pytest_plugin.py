@@ -395,6 +395,7 @@ def test_workers_of_xdist_send_their_runs_to_the_one_who_compares(suite: pytest.
     suite.makeconftest(STUBBED.format(folder=str(Path(__file__).parent)))
     result = suite.runpytest_subprocess(*COMPARE, "-n2", "--dotmask-summary", "summary.md")
     result.assert_outcomes(passed=3, failed=1)
+    result.stdout.no_fnmatch_line("INTERNALERROR*")
     result.stdout.fnmatch_lines([f"FAILED {NAME.replace('[', '[[]')} - worse: *masks.waste *points*"])
     assert "**worse**" in (suite.path / "summary.md").read_text()
 
