@@ -1,19 +1,30 @@
-"""The pytest plugin as its users meet it: pytest is run on small test files, most of them in this process."""
+"""The pytest plugin as its users meet it: pytest is run on small test files, in this process and on a stub of the run.
+
+No test that uses pytester makes frames: it forgets what was imported in the test, and Numba cannot bear to be imported
+again in part. The whole way, in processes of their own, is in tests/acceptance/test_ci_page.py.
+"""
 
 import json
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 
-# pytester forgets what is first imported in a run; NumPy refuses to be imported twice, and all of it takes long.
-import pytest_dotmask.kept_frames
 import pytest_dotmask.marks
 import pytest_dotmask.runs
 import pytest_dotmask.session
+from dotmask.records import Detections, FloatArray, Intrinsics, MaskedDepth, PoseEstimate, RgbdFrame
+from dotmask.slam.embedded import EmbeddedSlam
+from pytest_dotmask.kept_frames import FrameStore
+from pytest_dotmask.runs import DotmaskRun
+from scenarios.errors import ScenarioError
+from scenarios.registry import chosen_scenario
 from scenarios.report import MaskReport, MethodReport, Report, SegmenterReport, StageTimes, WorldTimes
 
 pytest_plugins = ["pytester"]
@@ -21,20 +32,12 @@ pytest_plugins = ["pytester"]
 TINY = {"room": "desk", "people.cast": [], "things": []}
 """A room without anybody, which is built in no time."""
 
-SUITE = f"""
-import os
-import numpy as np
+SUITE = """
 import pytest
 
-pytestmark = pytest.mark.dotmask("smoke", seeds=3, frames=4, overrides={TINY!r})
-
-def mask(rgb, depth_m, stamp_s):
-    hidden = np.zeros(depth_m.shape, bool)
-    hidden[:, : int(os.environ.get("HIDDEN_COLUMNS", "20"))] = True
-    return hidden
-
+@pytest.mark.dotmask("smoke", seeds=3, frames=4)
 def test_mask(dotmask_run, dotmask_scenario):
-    report = dotmask_run(mask=mask)
+    report = dotmask_run(mask=lambda rgb, depth_m, stamp_s: depth_m < 1)
     assert report.tracked_frames == dotmask_scenario.frames == 4
 """
 COMPARE = ("--dotmask-baseline", "baseline.json")
@@ -90,7 +93,7 @@ def stub(monkeypatch: pytest.MonkeyPatch) -> Stub:
 
 
 @pytest.fixture(autouse=True)
-def _environment(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
+def _environment(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CI", "true")  # pytest cuts no line
     monkeypatch.setenv("PYTEST_ADDOPTS", "-p no:hypothesispytest -p no:cov")  # a second to load, each time
 
@@ -105,71 +108,126 @@ def stored(pytester: pytest.Pytester) -> dict:
     return json.loads((pytester.path / "baseline.json").read_text())
 
 
-def test_seeds_are_tests_and_the_report_is_that_of_a_run(pytester: pytest.Pytester, dotmask, tmp_path: Path) -> None:
-    pytester.makepyfile(
-        f"""
-        import json
-        import pytest
+def runner(folder: Path, frames: int) -> DotmaskRun:
+    """What the fixture is, on a room without anybody."""
+    scenario = chosen_scenario("smoke", {**TINY, "frames": frames, "seed": 3})
+    return DotmaskRun("test_a.py::test[smoke]", FrameStore(threads=1).frames(scenario), folder, [], [])
 
-        @pytest.mark.dotmask("smoke", seeds=[3, 1], frames=3, overrides={TINY!r})
-        def test_a(dotmask_run, dotmask_scenario):
-            again = [dotmask_run(name=name, method="unmasked") for name in ("one", "two")]
-            told = [report.model_dump(exclude={{"time_ms"}}) for report in again]
-            assert told[0] == told[1]
-            print("FOUND", json.dumps(told[0] | {{"seed": dotmask_scenario.seed}}))
-        """
-    )
-    result = pytester.runpytest("-v", "-rP")
-    result.assert_outcomes(passed=2)
-    result.stdout.fnmatch_lines(["*::test_a[[]smoke-seed3] PASSED*", "*::test_a[[]smoke-seed1] PASSED*"])
-    found = [json.loads(line.removeprefix("FOUND ")) for line in result.outlines if line.startswith("FOUND")]
-    assert [one.pop("seed") for one in found] == [3, 1]
+
+def test_the_report_is_that_of_dotmask_run_and_frames_are_made_once(
+    dotmask: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = runner(tmp_path, frames=3)
+    first = run(method="unmasked", name="one")
+    monkeypatch.setattr("pytest_dotmask.kept_frames.Simulated", None)
     changes = [text for key, value in TINY.items() for text in ("--set", f"{key}={json.dumps(value)}")]
     arguments = ("run", "smoke", "--seed", 3, "--frames", 3, *changes, "--methods", "unmasked", "--out", tmp_path / "a")
-    of_command = json.loads(dotmask(*arguments, "--json").out)["methods"]["unmasked"]
-    del of_command["time_ms"]
-    assert found[0] == of_command, "the standard loop is one"
+    of_command = json.loads(dotmask(*arguments, "--json").out)
+    told = {"time_ms"}
+    for report in (first, run(method="unmasked", name="two")):
+        assert report.model_dump(exclude=told) == {
+            key: value for key, value in of_command["methods"]["unmasked"].items() if key not in told
+        }
+    scenarios = [(tmp_path / folder / "scenario.json").read_text() for folder in ("one", "a")]
+    assert scenarios[0] == scenarios[1]
 
 
-def test_a_segmenter_and_a_slam_of_the_users_own_are_run(pytester: pytest.Pytester) -> None:
-    pytester.makepyfile(
-        f"""
-        import numpy as np
-        import pytest
-        from dotmask.records import Detections, PoseEstimate, SlamResult, SlamStatus, Trajectory
-        from dotmask.slam.embedded import EmbeddedSlam
+def test_a_store_lets_go_of_what_was_used_least_lately(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pytest_dotmask.kept_frames.MOST_BYTES", 10)
+    store = FrameStore(threads=1)
+    scenarios = [chosen_scenario("smoke", {"seed": seed}) for seed in range(3)]
+    first, second = (store.frames(scenario) for scenario in scenarios[:2])
+    first.bytes, second.bytes = 6, 4
+    assert store.frames(scenarios[0]) is first
+    store.frames(scenarios[2]).bytes = 5
+    assert store.frames(scenarios[0]) is first
+    assert store.frames(scenarios[1]) is not second
 
-        pytestmark = pytest.mark.dotmask("smoke", frames=4, overrides={TINY!r})
 
-        class LeftHalf:
-            def segment(self, frame):
-                masks = np.zeros((1, *frame.depth_m.shape), bool)
-                masks[0, :, :160] = True
-                boxes = np.array([[0.0, 0, 159, 239]])
-                return Detections(masks=masks, boxes_px=boxes, class_names=("person",), scores=np.ones(1))
+class LeftHalf:
+    """A segmenter."""
 
-        class Watched(EmbeddedSlam):
-            seen = []
+    def segment(self, frame: RgbdFrame) -> Detections:
+        masks = np.zeros((1, *frame.depth_m.shape), bool)
+        masks[0, :, :160] = True
+        boxes = np.array([[0.0, 0, 159, 239]])
+        return Detections(masks=masks, boxes_px=boxes, class_names=("person",), scores=np.ones(1))
 
-            def track(self, frame, masked):
-                self.seen.append((masked.mo_mdi_m[:, :160] == 0).all())
-                return super().track(frame, masked)
 
-        def test_both(dotmask_run):
-            report = dotmask_run(segmenter=LeftHalf(), slam=Watched, method="mdi")
-            assert Watched.seen == [True] * 4
-            assert 0.4 < report.masks.waste < 0.6
+class Watched(EmbeddedSlam):
+    """A SLAM back end that remembers whether it saw anything in the left half."""
 
-        def test_two_masks(dotmask_run):
-            def both(rgb, depth_m, stamp_s):
-                rgb[:] = 0  # the images are the function's own
-                nothing = np.zeros(depth_m.shape, np.uint8)
-                return {{"odometry": nothing, "map": nothing + 1}}
-            assert dotmask_run(mask=both).masks.waste == 0
-            assert dotmask_run(mask=lambda *images: ~both(*images)["map"].astype(bool), name="all shown").ate_rmse_m > 0
-        """
-    )
-    pytester.runpytest().assert_outcomes(passed=2)
+    def __init__(self, intrinsics: Intrinsics, T_world_camera: FloatArray) -> None:
+        super().__init__(intrinsics, T_world_camera)
+        self.saw: list[bool] = []
+
+    def track(self, frame: RgbdFrame, masked: MaskedDepth) -> PoseEstimate:
+        self.saw.append(bool(masked.mo_mdi_m[:, :160].any()))
+        return super().track(frame, masked)
+
+
+def test_a_segmenter_and_a_slam_of_the_users_own_are_run(tmp_path: Path) -> None:
+    made: list[Watched] = []
+
+    def make(intrinsics: Intrinsics, T_world_camera: FloatArray) -> Watched:
+        made.append(Watched(intrinsics, T_world_camera))
+        return made[-1]
+
+    report = runner(tmp_path, frames=4)(segmenter=LeftHalf(), slam=make, method="mdi")
+    assert [slam.saw for slam in made] == [[False] * 4]
+    assert report.tracked_frames == 4
+    assert 0.4 < report.masks.waste < 0.6
+    told = json.loads((tmp_path / "mdi" / "report.json").read_text())
+    assert (told["segmenter"]["name"], "make" in told["slam"]) == ("LeftHalf", True)
+
+
+def test_a_mask_is_asked_for_every_frame(tmp_path: Path) -> None:
+    stamps = []
+
+    def both(rgb: np.ndarray, depth_m: np.ndarray, stamp_s: float) -> dict[str, np.ndarray]:
+        rgb[:] = 0  # the images are the function's own
+        stamps.append(stamp_s)
+        nothing = np.zeros(depth_m.shape, np.uint8)
+        return {"odometry": nothing, "map": nothing + 1}
+
+    run = runner(tmp_path, frames=3)
+    shown = run(mask=both)
+    assert stamps == [0.0, 1 / 30, 2 / 30]
+    assert shown.masks.waste == 0
+    hidden = run(mask=lambda *images: ~both(*images)["odometry"].astype(bool) | True, name="nothing left")
+    assert hidden.masks.waste == 1
+    for wrong, message in (
+        (lambda *images: np.zeros((3, 4)), r"the size of the image, \(240, 320\); got \(3, 4\)"),
+        (lambda *images: {"map": np.zeros((240, 320))}, r"give a mask, or .*; got \['map'\]"),
+    ):
+        with pytest.raises(ScenarioError, match=message):
+            run(mask=wrong, name="wrong")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"mask": len, "segmenter": LeftHalf()}, "give mask= or segmenter=, not both"),
+        ({"mask": len, "method": "mdi"}, "give mask= or method=, not both"),
+        ({"method": "mdj"}, "unknown method 'mdj'. Did you mean mdi?"),
+        ({"name": "../a"}, "without a slash"),
+        ({"name": "there"}, "has a run 'there' already"),
+    ],
+)
+def test_arguments_that_do_not_fit_are_refused(
+    tmp_path: Path, stub: "Stub", arguments: dict[str, Any], message: str
+) -> None:
+    run = runner(tmp_path, frames=2)
+    run(name="there")
+    with pytest.raises(ScenarioError, match=message):
+        run(**arguments)
+
+
+def test_every_seed_is_a_test(suite: pytest.Pytester, stub: "Stub") -> None:
+    suite.makepyfile(test_suite=SUITE.replace("seeds=3", "seeds=[3, 1]"))
+    result = suite.runpytest("-v")
+    result.assert_outcomes(passed=2)
+    result.stdout.fnmatch_lines(["*::test_mask[[]smoke-seed3] PASSED*", "*::test_mask[[]smoke-seed1] PASSED*"])
 
 
 @pytest.mark.parametrize(
@@ -199,36 +257,6 @@ def test_a_bad_marker_is_one_line(pytester: pytest.Pytester, mark: str, message:
 def test_a_test_without_a_marker_is_told_how(pytester: pytest.Pytester) -> None:
     pytester.makepyfile("def test_a(dotmask_run): pass")
     pytester.runpytest().stdout.fnmatch_lines(["*::test_a: it uses dotmask_scenario or dotmask_run: mark it, *"])
-
-
-def test_arguments_that_do_not_fit_fail_the_test(pytester: pytest.Pytester) -> None:
-    pytester.makepyfile(
-        f"""
-        import numpy as np
-        import pytest
-        from scenarios.errors import ScenarioError
-
-        def nothing(rgb, depth_m, stamp_s):
-            return np.zeros(depth_m.shape, bool)
-
-        @pytest.mark.dotmask("smoke", frames=2, overrides={TINY!r})
-        def test_a(dotmask_run):
-            for arguments, message in (
-                (dict(mask=nothing, segmenter=object()), "give mask= or segmenter=, not both"),
-                (dict(mask=nothing, method="mdi"), "give mask= or method=, not both"),
-                (dict(name="../a"), "without a slash"),
-                (dict(method="mdj"), "unknown method 'mdj'. Did you mean mdi?"),
-                (dict(mask=lambda *images: np.zeros((3, 4))), r"the size of the image, \\(240, 320\\); got \\(3, 4\\)"),
-                (dict(mask=lambda *images: {{"map": 1}}), "give a mask, or"),
-            ):
-                with pytest.raises(ScenarioError, match=message):
-                    dotmask_run(**arguments)
-            dotmask_run(mask=nothing)
-            with pytest.raises(ScenarioError, match="has a run 'mask' already"):
-                dotmask_run(mask=nothing)
-        """
-    )
-    pytester.runpytest().assert_outcomes(passed=1)
 
 
 def test_options_that_cannot_work_are_one_line(suite: pytest.Pytester) -> None:
@@ -353,15 +381,21 @@ def test_other_parameters_and_classes_stay_in_the_name(pytester: pytest.Pytester
     assert told == {(name, seed) for name in names for seed in (1, 12)}
 
 
-def test_workers_of_xdist_send_their_runs_to_the_one_who_compares(
-    suite: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
-) -> None:
+STUBBED = """
+import sys
+sys.path.insert(0, {folder!r})
+import pytest_dotmask.runs
+import test_pytest_plugin
+pytest_dotmask.runs.run_source = test_pytest_plugin.Stub(waste=0.5)
+"""
+
+
+def test_workers_of_xdist_send_their_runs_to_the_one_who_compares(suite: pytest.Pytester, stub: Stub) -> None:
     suite.runpytest(*UPDATE).assert_outcomes(passed=3)
-    single = stored(suite)
-    assert len({run["frame_hash"] for run in single["runs"]}) == 3
-    monkeypatch.setenv("HIDDEN_COLUMNS", "160")
+    suite.makeconftest(STUBBED.format(folder=str(Path(__file__).parent)))
     result = suite.runpytest_subprocess(*COMPARE, "-n2", "--dotmask-summary", "summary.md")
     result.assert_outcomes(passed=3, failed=1)
+    result.stdout.no_fnmatch_line("INTERNALERROR*")
     result.stdout.fnmatch_lines([f"FAILED {NAME.replace('[', '[[]')} - worse: *masks.waste *points*"])
     assert "**worse**" in (suite.path / "summary.md").read_text()
 

@@ -92,6 +92,15 @@ def test_worse_is_what_lies_above_the_margin_with_its_whole_interval(losses: lis
     assert [verdict.is_worse for verdict in backwards] == [verdict.is_worse for verdict in found]
 
 
+@pytest.mark.parametrize("seeds", [3, 5, 8])
+def test_the_lower_end_of_the_interval_is_the_largest_margin_that_it_is_worse_by(seeds: int) -> None:
+    losses = np.random.default_rng(seeds).normal(2.0, 0.1, seeds)
+    low = verdicts([losses], [0.1])[0].low
+    assert 0.1 < low < losses.mean()
+    assert verdicts([losses], [low - 1e-9])[0].is_worse
+    assert not verdicts([losses], [low + 1e-9])[0].is_worse
+
+
 def test_runs_with_the_same_figures_are_never_worse_and_equal_losses_are() -> None:
     for loss, is_worse in ((0.0, False), (1e-15, False), (0.099, False), (0.101, True)):
         (verdict,) = verdicts([np.full(3, loss)], [0.1])
