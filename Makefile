@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: demo test test-all example-ci lint clean
+.PHONY: demo test test-all from-wheel lint clean
 
 demo: $(VENV)/.installed  ## install and run the whole way once: about four minutes
 	$(BIN)/dotmask run fr3_walking_xyz --out runs/demo-$$(date +%Y%m%d-%H%M%S)
@@ -15,8 +15,8 @@ test: $(VENV)/.installed-dev  ## install and run the tests but the long ones
 test-all: $(VENV)/.installed-dev  ## install and run all tests
 	$(BIN)/python -m pytest -n auto --dist loadfile $(PYTEST_ARGS)
 
-example-ci: $(VENV)/.installed-dev  ## the toy project of examples/ci, with the wheel in an environment of its own
-	$(BIN)/python .ci/example_ci.py
+from-wheel: $(VENV)/.installed-dev  ## the wheel in an environment of its own: sweep, Gymnasium, examples/ci
+	$(BIN)/python .ci/from_wheel.py
 
 lint: $(VENV)/.installed-dev  ## style, types, dependency rule, spelling
 	$(BIN)/ruff check .
