@@ -33,23 +33,23 @@ class TextureAtlas:
         texels = np.empty(offsets[-1], np.uint32)
         for image, offset in zip(images, offsets.tolist(), strict=False):
             # Two channels in one number, with room for the sum of four.
-            red_blue = image[..., 0] | image[..., 2].astype(np.uint32) << 16
+            red_blue = image[..., 0] | image[..., 2].astype(np.uint32) << np.uint32(16)
             green = image[..., 1].astype(np.uint32)
             first = offset
             while True:
                 last = first + green.size
-                _put_tiles(red_blue | green << 8, texels[first:last])
+                _put_tiles(red_blue | green << np.uint32(8), texels[first:last])
                 if len(green) == 1:
                     break
                 first = last
-                red_blue, green = _halved(red_blue) & 0x00FF00FF, _halved(green) & 0xFF
+                red_blue, green = _halved(red_blue) & np.uint32(0x00FF00FF), _halved(green) & np.uint32(0xFF)
         return cls(texels=texels, offsets=offsets[:-1].astype(np.int32), sizes=sizes)
 
 
 def _halved(level: npt.NDArray[np.uint32]) -> npt.NDArray[np.uint32]:
     """The rounded means of 2x2 texels (S / 2, S / 2); in each upper half bits are left over from the next."""
     rows = level[::2] + level[1::2]
-    return np.asarray((rows[:, ::2] + rows[:, 1::2] + 0x00020002) >> 2, np.uint32)
+    return (rows[:, ::2] + rows[:, 1::2] + np.uint32(0x00020002)) >> np.uint32(2)
 
 
 def _put_tiles(level: npt.NDArray[np.uint32], texels: npt.NDArray[np.uint32]) -> None:
