@@ -75,7 +75,7 @@ class FeatureExtractor:
             return _NO_FEATURES
         corners = cv2.cornerSubPix(grey, corners, (SUBPIXEL_PX, SUBPIXEL_PX), (-1, -1), SUBPIXEL_CRITERIA)
         # Keypoints without an angle give upright descriptors.
-        keypoints = [cv2.KeyPoint(u, v, PATCH_PX) for u, v in corners[:, 0].tolist()]
+        keypoints = cv2.KeyPoint.convert(corners[:, 0], size=PATCH_PX, response=0.0)  # type: ignore[call-overload]
         described, descriptors = self._orb.compute(grey, keypoints)
         assert len(described) == len(corners), "every patch lies inside the image"
         pixels = corners[:, 0].astype(np.float64)
