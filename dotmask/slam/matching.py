@@ -10,14 +10,13 @@ import numpy.typing as npt
 
 from dotmask.records import FloatArray
 from dotmask.slam.features import Descriptors, Features
+from dotmask.slam.matching_kernels import FAR, nearest_two
 
 Matches = npt.NDArray[np.intp]
 """(M, 2): index of the map point, index of the corner."""
 
 Groups = npt.NDArray[np.intp]
 """(N,) which group each descriptor belongs to."""
-
-_FAR = 1 << 16
 
 
 def match_near(
@@ -39,13 +38,9 @@ def match_near(
         max_hamming: most differing bits.
         ratio: the nearest descriptor in the window must be nearer than this times the second nearest.
     """
-    point, corner = _candidates(expected_px, features.pixels, radius_px)
-    if len(point) == 0:
-        return np.zeros((0, 2), np.intp)
-    hamming = _hamming(descriptors, point, features.descriptors, corner)
-
-    # One sortable key per candidate: distance first, then the corner.
-    best, second = _best_two(point, (hamming << 32) | corner, len(descriptors))
+    best, second = nearest_two(
+        expected_px, _words(descriptors), features.pixels, _words(features.descriptors), radius_px
+    )
     return _one_to_one(np.arange(len(best)), best & 0xFFFFFFFF, best >> 32, second >> 32, max_hamming, ratio)
 
 
@@ -99,6 +94,11 @@ def match_within_groups(
     return np.stack([candidates[mutual], to[mutual]], axis=1).astype(np.intp)
 
 
+def _words(descriptors: Descriptors) -> npt.NDArray[np.uint64]:
+    """(N, 4) the same bits."""
+    return np.ascontiguousarray(descriptors).view(np.uint64)
+
+
 def _hamming(
     descriptors: Descriptors,
     chosen: npt.NDArray[np.int64],
@@ -106,8 +106,8 @@ def _hamming(
     other_chosen: npt.NDArray[np.int64],
 ) -> npt.NDArray[np.int64]:
     """(P,) differing bits of P pairs of descriptors, each chosen (P,) from (N, 32) and (K, 32)."""
-    words = np.ascontiguousarray(descriptors).view(np.uint64).take(chosen, axis=0)
-    words ^= np.ascontiguousarray(other_descriptors).view(np.uint64).take(other_chosen, axis=0)
+    words = _words(descriptors).take(chosen, axis=0)
+    words ^= _words(other_descriptors).take(other_chosen, axis=0)
     a, b, c, d = np.bitwise_count(words).astype(np.int64).T
     return np.asarray(a + b + c + d)  # a reduction over so short an axis takes several times as long
 
@@ -118,10 +118,10 @@ def _best_two(
     """The two least keys of each owner (their runs in rising order): two arrays (owners,), far where there is none."""
     starts = np.flatnonzero(np.r_[True, owner[1:] != owner[:-1]])
     lengths = np.diff(np.r_[starts, len(owner)])
-    best, second = np.full(owners, _FAR << 32), np.full(owners, _FAR << 32)
+    best, second = np.full(owners, FAR << 32), np.full(owners, FAR << 32)
     least = np.minimum.reduceat(keys, starts)
     best[owner[starts]] = least
-    others = np.where(keys == np.repeat(least, lengths), _FAR << 32, keys)
+    others = np.where(keys == np.repeat(least, lengths), FAR << 32, keys)
     second[owner[starts]] = np.minimum.reduceat(others, starts)
     return best, second
 
@@ -139,35 +139,3 @@ def _one_to_one(
     _, first = np.unique(corner[good], return_index=True)
     chosen = np.sort(good[first])
     return np.stack([point[chosen], corner[chosen]], axis=1).astype(np.intp)
-
-
-def _candidates(
-    expected_px: FloatArray, pixels: FloatArray, radius_px: float
-) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """Every pair of a point and a corner in its window, in the order of the points.
-
-    The corners are sorted into square cells of the radius, row by row. A window touches three cells of three rows,
-    and the three cells of one row are one run of the sorted corners.
-    """
-    if len(expected_px) == 0 or len(pixels) == 0:
-        return np.zeros(0, np.int64), np.zeros(0, np.int64)
-    cells = np.floor(pixels / radius_px).astype(np.int64) + 2  # the first two stay empty, as do the last two
-    columns, rows = cells.max(axis=0) + 3
-    cell = cells[:, 1] * columns + cells[:, 0]
-    order = np.argsort(cell, kind="stable")
-    first_of_cell = np.searchsorted(cell[order], np.arange(columns * rows + 1))
-
-    wanted = np.floor(expected_px / radius_px).astype(np.int64) + 2
-    column, row = wanted.T
-    near = np.flatnonzero((column > 0) & (column < columns - 1) & (row > 0) & (row < rows - 1))
-    left = (row[near, None] + np.array([-1, 0, 1])) * columns + column[near, None] - 1
-    start = first_of_cell[left]
-    counts = first_of_cell[left + 3] - start
-    ends = np.cumsum(counts).reshape(counts.shape)
-    corner = order[np.repeat(start - ends + counts, counts.ravel()) + np.arange(counts.sum())]
-    point = np.repeat(near, counts.sum(axis=1))
-    (u, v), (corner_u, corner_v) = expected_px.T, pixels.T
-    is_inside = np.abs(u[point] - corner_u[corner]) <= radius_px
-    is_inside &= np.abs(v[point] - corner_v[corner]) <= radius_px
-    inside = np.flatnonzero(is_inside)
-    return point[inside], corner[inside]

@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from dotmask.geometry import rotation_from_vector, transform
 from dotmask.records import FloatArray, Intrinsics
+from dotmask.slam.pose_kernels import normal_equations
 from dotmask.slam.settings import REFERENCE_WIDTH_PX, OdometrySettings
 
 RANSAC_ITERATIONS = 300
@@ -52,29 +53,6 @@ class _Seen:
     y: FloatArray
     depth_m: FloatArray
     inverse_sigma: FloatArray
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Linearised:
-    """Residuals of N matches at a pose, three each: u, v, depth.
-
-    Attributes:
-        residual: (3N,) pixels of the reference width, then standard deviations of depth.
-        weight: (3N,) of the Huber loss.
-        J: (6, 3N) derivatives of the residuals over the twist.
-    """
-
-    residual: FloatArray
-    weight: FloatArray
-    J: FloatArray
-
-    def normal_equations(self) -> tuple[FloatArray, FloatArray]:
-        """Hessian (6, 6) of the loss, a little damped, and its gradient (6,)."""
-        # einsum of two operands sums in a fixed order; a BLAS product may not, for another number of threads.
-        weighted = self.J * self.weight
-        hessian, gradient = np.einsum("in,jn->ij", weighted, self.J), np.einsum("in,n->i", weighted, self.residual)
-        hessian.ravel()[::7] += 1e-9 * hessian.trace()
-        return hessian, gradient
 
 
 class PoseSolver:
@@ -146,12 +124,11 @@ class PoseSolver:
         """Gauss-Newton on the pose alone with Huber weights, from the start `T_camera_world`.
 
         Residuals: `u` and `v` in pixels of the reference width (one common weight), and depth in standard deviations.
-        The increment is a twist (rotation w, translation t) from the left: with `Y = T X`, `dY = w x Y + t`. So for a
-        residual with gradient g over Y, the derivative is g over t and `Y x g` over w.
+        The increment is a twist from the left; see `dotmask.slam.pose_kernels.normal_equations`.
         """
         T, seen = T_camera_world, self._seen(p_world, pixels, depth_m)
         for _ in range(GAUSS_NEWTON_STEPS):
-            hessian, gradient = self._linearise(T, seen).normal_equations()
+            hessian, gradient, _ = self._normal_equations(T, seen)
             step = np.asarray(-np.linalg.solve(hessian, gradient), float)
             T = _rigid(step[:3], step[3:]) @ T
             if np.abs(step).max() < CONVERGED:
@@ -168,27 +145,23 @@ class PoseSolver:
             inverse_sigma=1.0 / self.depth_sigma(depth_m),
         )
 
-    def _linearise(self, T_camera_world: FloatArray, seen: _Seen) -> _Linearised:
-        delta = self._settings.huber
-        x, y, z = transform(T_camera_world, seen.p_world).T
-        inverse_z = 1.0 / np.maximum(z, NEAREST_M)
-        a, b = self._camera.fx / self._scale * inverse_z, self._camera.fy / self._scale * inverse_z
-        r_u, r_v, r_z = a * x - seen.x, b * y - seen.y, (z - seen.depth_m) * seen.inverse_sigma
-        # Huber: weight 1 inside the threshold, threshold/|r| outside.
-        pixel_weight = delta / np.maximum(np.hypot(r_u, r_v), delta)
-        depth_weight = delta / np.maximum(np.abs(r_z), delta)
-        g_u, g_v, g_z = -a * x * inverse_z, -b * y * inverse_z, seen.inverse_sigma
-        J = np.zeros((6, 3, len(z)))
-        J[0] = y * g_u, y * g_v - z * b, y * g_z
-        J[1] = z * a - x * g_u, -x * g_v, -x * g_z
-        J[2, 0], J[2, 1] = -y * a, x * b
-        J[3, 0], J[4, 1] = a, b
-        J[5] = g_u, g_v, g_z
-        return _Linearised(
-            residual=np.concatenate([r_u, r_v, r_z]),
-            weight=np.concatenate([pixel_weight, pixel_weight, depth_weight]),
-            J=J.reshape(6, -1),
+    def _normal_equations(self, T_camera_world: FloatArray, seen: _Seen) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Hessian (6, 6) of the loss, a little damped, its gradient (6,), and the matches' squared gradients (6, 6)."""
+        camera, scale = self._camera, self._scale
+        hessian, gradient, spread = normal_equations(
+            T_camera_world,
+            seen.p_world,
+            seen.x,
+            seen.y,
+            seen.depth_m,
+            seen.inverse_sigma,
+            camera.fx / scale,
+            camera.fy / scale,
+            self._settings.huber,
+            NEAREST_M,
         )
+        hessian.ravel()[::7] += 1e-9 * hessian.trace()
+        return hessian, gradient, spread
 
     def _covariance(
         self, T_camera_world: FloatArray, p_world: FloatArray, pixels: FloatArray, depth_m: FloatArray
@@ -198,10 +171,7 @@ class PoseSolver:
         `gᵢ` is the gradient of the three residuals of a match, which need not be independent. So the noise needs no
         model: it is read off the residuals.
         """
-        at = self._linearise(T_camera_world, self._seen(p_world, pixels, depth_m))
-        hessian, _ = at.normal_equations()
-        gradients = (at.J * (at.weight * at.residual)).reshape(6, 3, -1).sum(axis=1)
-        spread = np.einsum("in,jn->ij", gradients, gradients)
+        hessian, _, spread = self._normal_equations(T_camera_world, self._seen(p_world, pixels, depth_m))
         inverse_hessian = np.linalg.inv(hessian)
         # Six numbers were fitted to the residuals, which are the smaller for it.
         freedom = 3 * len(depth_m) / (3 * len(depth_m) - 6)
