@@ -1,11 +1,11 @@
 """What holds for every registered scenario; those that share all their frames are rendered once."""
 
 import hashlib
-from functools import cache
 
 import numpy as np
 import pytest
 
+from scenarios.cast import build_cast
 from scenarios.registry import RENDERED_AS, SCENARIOS
 from scenarios.spec import Scenario, with_overrides
 from scenarios.world import build_simulator
@@ -20,7 +20,6 @@ def small(name: str, **overrides: str) -> Scenario:
     return with_overrides(SCENARIOS[name], {**quarter, **centre, **overrides})
 
 
-@cache
 def simulator_of(name: str) -> Simulator:
     return build_simulator(small(name), "numba", 1)
 
@@ -60,8 +59,7 @@ def test_another_simulator_with_two_threads_gives_the_same_bytes_and_another_see
 
 @pytest.mark.parametrize("name", [n for n in SCENARIOS if "walking" in n])
 def test_walking_people_always_move_and_stay_in_the_room(name: str) -> None:
-    simulator = simulator_of(name)
-    people = [a for a in simulator.scene.actors if a.class_name == "person"]
+    people = build_cast(SCENARIOS[name])
     assert len(people) == 2
     for person in people:
         for time_s in np.linspace(0, SCENARIOS[name].duration_s, 40):
