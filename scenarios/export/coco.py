@@ -10,9 +10,10 @@ import numpy as np
 from dotmask.partial_folder import PartialFolder
 from dotmask.tum import CAMERA_FILE, camera_json, colour_png
 from scenarios.bridge import intrinsics_from_camera
-from scenarios.export.coco_names import CATEGORY_IDS, KEYPOINTS, SKELETON, supercategory
+from scenarios.export.coco_names import CATEGORY_IDS, SKELETON, supercategory
 from scenarios.export.json_list import JsonList
 from scenarios.export.run_lengths import counts_from_columns, text_from_counts
+from sim.people.keypoints import KEYPOINT_NAMES
 from sim.records import KeypointsTruth, SimFrame
 from sim.simulator import Simulator
 
@@ -40,7 +41,11 @@ class CocoExport:
         self._folder, self._camera, self._facts = folder, simulator.camera, facts
         self._annotated = [obj for obj in simulator.scene.objects if obj.instance_id and obj.class_name in CATEGORY_IDS]
         info = {"description": "rendered by dotmask: every mask is exact", "version": "1.0"}
-        person = {**_category("person"), "keypoints": list(KEYPOINTS), "skeleton": [list(pair) for pair in SKELETON]}
+        person = {
+            **_category("person"),
+            "keypoints": list(KEYPOINT_NAMES),
+            "skeleton": [list(pair) for pair in SKELETON],
+        }
         head = {"info": info, "licenses": []}
         self._instances = JsonList(
             folder.files,

@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from types import MappingProxyType
 
+from sim.people.keypoints import SKELETON_LINKS
+
 CATEGORY_IDS: Mapping[str, int] = MappingProxyType(
     {
         "person": 1,
@@ -53,30 +55,7 @@ SUPERCATEGORIES: Mapping[range, str] = MappingProxyType(
     }
 )
 
-KEYPOINTS = (
-    "nose",
-    "left_eye",
-    "right_eye",
-    "left_ear",
-    "right_ear",
-    "left_shoulder",
-    "right_shoulder",
-    "left_elbow",
-    "right_elbow",
-    "left_wrist",
-    "right_wrist",
-    "left_hip",
-    "right_hip",
-    "left_knee",
-    "right_knee",
-    "left_ankle",
-    "right_ankle",
-)
-
-SKELETON = (
-    (16, 14), (14, 12), (17, 15), (15, 13), (12, 13), (6, 12), (7, 13), (6, 7), (6, 8), (7, 9),
-    (8, 10), (9, 11), (2, 3), (1, 2), (1, 3), (2, 4), (3, 5), (4, 6), (5, 7),
-)  # fmt: skip
+SKELETON = tuple((a + 1, b + 1) for a, b in SKELETON_LINKS)
 """Limbs as pairs of keypoint numbers from 1, as in COCO's own `person_keypoints` files."""
 
 

@@ -5,9 +5,10 @@ from typing import Any
 
 from dotmask.partial_folder import GrowingFiles
 from dotmask.tum import pose_columns, stamp_text
-from scenarios.export.coco_names import KEYPOINTS, SKELETON
+from scenarios.export.coco_names import SKELETON
 from scenarios.export.json_list import JsonList
 from scenarios.spec import Scenario
+from sim.people.keypoints import KEYPOINT_NAMES
 from sim.records import KeypointsTruth, ObjectTruth, SimFrame
 
 OBJECTS_FILE, KEYPOINTS_FILE, SCENARIO_FILE = "objects.csv", "keypoints.json", "scenario.json"
@@ -33,7 +34,7 @@ class TruthFiles:
         self._keypoints = JsonList(
             files,
             KEYPOINTS_FILE,
-            {"keypoints": list(KEYPOINTS), "skeleton": [list(pair) for pair in SKELETON]},
+            {"keypoints": list(KEYPOINT_NAMES), "skeleton": [list(pair) for pair in SKELETON]},
             "frames",
         )
 

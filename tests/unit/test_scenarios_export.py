@@ -17,13 +17,14 @@ from scipy.spatial.transform import Rotation
 from dotmask.partial_folder import GrowingFiles, PartialFolder
 from dotmask.tum import read_camera, read_sequence, read_trajectory
 from scenarios.export.coco import CocoExport
-from scenarios.export.coco_names import CATEGORY_IDS, KEYPOINTS, SKELETON, supercategory
+from scenarios.export.coco_names import CATEGORY_IDS, SKELETON, supercategory
 from scenarios.export.json_list import JsonList
 from scenarios.export.kitti import KittiExport
 from scenarios.export.run_lengths import counts_from_columns, text_from_counts
 from scenarios.export.truth import OBJECT_COLUMNS, TruthFiles, decimal
 from scenarios.export.tum import TumExport
 from scenarios.spec import Scenario, scenario_from_json
+from sim.people.keypoints import KEYPOINT_NAMES
 from sim.records import CameraModel, GroundTruth, KeypointsTruth, ObjectTruth, SimFrame
 
 # pycocotools' arrays are of the time before numpy 2, which numpy tells at every use.
@@ -191,7 +192,7 @@ def test_objects_and_keypoints(tmp_path: Path) -> None:
     assert int(first["visible_pixels"]) == (frame(0).truth.instance_ids == PERSON).sum()
 
     told = json.loads((root / "keypoints.json").read_text())
-    assert tuple(told["keypoints"]) == KEYPOINTS
+    assert tuple(told["keypoints"]) == KEYPOINT_NAMES
     assert len(told["frames"]) == 3
     (person,) = told["frames"][1]["people"]
     assert (person["name"], person["instance_id"]) == ("anton", PERSON)
@@ -240,7 +241,7 @@ def test_coco_folder_is_loaded_by_pycocotools(tmp_path: Path) -> None:
     np.testing.assert_allclose(points[:16, :2], keypoints().pixels[:16], atol=1e-3)
     np.testing.assert_array_equal(points[16], 0)
     (person,) = people.loadCats(people.getCatIds())
-    assert person["keypoints"] == list(KEYPOINTS)
+    assert person["keypoints"] == list(KEYPOINT_NAMES)
 
 
 def test_the_skeleton_and_the_groups_are_complete() -> None:
