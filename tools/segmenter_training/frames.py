@@ -92,15 +92,19 @@ class FrameStore:
         seed: of the training.
         scenes: how many there are.
         frames_a_scene: of each.
+
+    Attributes:
+        frames_a_scene: of each.
     """
 
     def __init__(self, folder: Path, seed: int, scenes: int, frames_a_scene: int = FRAMES_A_SCENE) -> None:
         folder.mkdir(parents=True, exist_ok=True)
-        self._folder, self._seed, self._scenes, self._count = folder, seed, scenes, frames_a_scene
+        self.frames_a_scene = frames_a_scene
+        self._folder, self._seed, self._scenes = folder, seed, scenes
         self._scene = lru_cache(maxsize=None)(self._opened)
 
     def __len__(self) -> int:
-        return self._scenes * self._count
+        return self._scenes * self.frames_a_scene
 
     def __getitem__(self, index: int) -> LabelledFrame:
         """Frame `index`; its arrays are read from disk when they are used.
@@ -108,7 +112,7 @@ class FrameStore:
         Raises:
             TrainingError: its scene was not rendered, or its files are damaged.
         """
-        number, frame = divmod(index, self._count)
+        number, frame = divmod(index, self.frames_a_scene)
         rgb, labels, classes = self._scene(number)
         return LabelledFrame(rgb=np.asarray(rgb[frame]), labels=np.asarray(labels[frame]), classes=classes[frame])
 
@@ -126,15 +130,17 @@ class FrameStore:
         missing = self.missing()
         if processes == 1 or len(missing) < 2:
             for number in missing:
-                self.write(number, render_frames(self._seed, number, self._count))
-                advance(self._count)
+                self.write(number, render_frames(self._seed, number, self.frames_a_scene))
+                advance(self.frames_a_scene)
             return
         with ProcessPoolExecutor(processes, mp_context=get_context("spawn"), initializer=_one_thread) as pool:
-            waiting = [pool.submit(_render_and_write, self._folder, self._seed, n, self._count) for n in missing]
+            waiting = [
+                pool.submit(_render_and_write, self._folder, self._seed, n, self.frames_a_scene) for n in missing
+            ]
             try:
                 for done in as_completed(waiting):
                     done.result()
-                    advance(self._count)
+                    advance(self.frames_a_scene)
             except BaseException:
                 pool.shutdown(wait=False, cancel_futures=True)
                 raise

@@ -49,7 +49,9 @@ def tinted_thing(thing: SceneObject, rng: np.random.Generator, share: float) -> 
     surfaces = []
     for surface in thing.surfaces:
         if rng.random() < share:
-            surface = replace(surface, texture=_scaled(surface.texture, rng.uniform(0.55, 1.1) * rng.uniform(0.8, 1.1, 3)))
+            surface = replace(
+                surface, texture=_scaled(surface.texture, rng.uniform(0.55, 1.1) * rng.uniform(0.8, 1.1, 3))
+            )
         surfaces.append(surface)
     return replace(thing, surfaces=tuple(surfaces))
 

@@ -6,7 +6,7 @@ at times of their own, and puts them somewhere else: a new picture for the price
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -156,7 +156,9 @@ def draw_moment(drawn: TrainingScene, rng: np.random.Generator) -> tuple[Moment,
             continue
         time_s = float(rng.uniform(0.0, group.longest_s)) if group.longest_s else 0.0
         if group.anchor is not None:
-            T_world_group = T_world_group @ _stretched(rng) @ inverse(_actor(drawn, group.anchor).motion.pose_at(time_s))
+            T_world_group = (
+                T_world_group @ _stretched(rng) @ inverse(_actor(drawn, group.anchor).motion.pose_at(time_s))
+            )
         for name in group.names:
             where[name], times[name] = T_world_group, time_s
     palettes = {

@@ -79,7 +79,7 @@ def read_state(folder: Path, settings: Settings) -> tuple[int, float, dict[str, 
     try:
         with safe_open(path, framework="pt") as file:
             told = file.metadata()
-            for key in file.keys():  # noqa: SIM118: the file is no mapping
+            for key in file.keys():  # noqa: SIM118 the file is no mapping
                 part, _, name = key.partition("/")
                 parts.setdefault(part, {})[name] = file.get_tensor(key)
         step, seconds, written = int(told["step"]), float(told["seconds"]), json.loads(told["settings"])

@@ -56,12 +56,6 @@ class Frames(Protocol):
         ...
 
 
-def best_precision(device: str) -> str:
-    """"bfloat16" where the processor multiplies such numbers by itself, else "float32"."""
-    fast = device == "cuda" or torch.ops.mkldnn._is_mkldnn_bf16_supported()
-    return "bfloat16" if fast else "float32"
-
-
 def learning_rate(step: int, settings: Settings) -> float:
     """Of step `step`, counted from 0: up along a line, down along a cosine."""
     rising = max(1, round(WARM_UP * settings.steps))
