@@ -54,13 +54,13 @@ def hardware(settings: Settings) -> str:
         for line in (cpuinfo.read_text(encoding="utf-8").splitlines() if cpuinfo.is_file() else [])
         if line.startswith("model name")
     ]
-    return f"{settings.threads} threads of {names[0] if names else platform.machine()}, PyTorch {torch.__version__}"
+    return f"{settings.threads} thread(s) of {names[0] if names else platform.machine()}, PyTorch {torch.__version__}"
 
 
 def card(facts: Facts, on_held_out: SegmenterEvaluation, on_catalog: SegmenterEvaluation) -> str:
     """The card in Markdown."""
     s = facts.settings
-    frames = s.scenes * s.frames_a_scene
+    frames, mask_px = s.scenes * s.frames_a_scene, f"{WIDTH // MASK_SHARE}x{HEIGHT // MASK_SHARE}"
     return f"""# `compact`: model card
 
 Written by `{facts.command}`; no figure here was typed by hand.
@@ -116,9 +116,8 @@ a quarter with motion blur and rolling shutter. An instance is to be found if it
 
 ## Limits
 
-It knows the people, chairs, cups and bottles of this simulator alone. Masks have {WIDTH // MASK_SHARE}x
-{HEIGHT // MASK_SHARE} pixels: the rims of small things are coarse. How often it misses what is far, rolled, cut or
-blurred is said above.
+It knows the people, chairs, cups and bottles of this simulator alone. Masks have {mask_px} pixels: the rims of
+small things are coarse. How often it misses what is far, rolled, cut or blurred is said above.
 """
 
 
@@ -163,7 +162,7 @@ def _results(evaluation: SegmenterEvaluation) -> str:
     ms = evaluation.ms
     assert ms.median is not None
     assert ms.p95 is not None
-    where = f"{ms.threads} threads" if evaluation.segmenter.device == "cpu" else str(evaluation.segmenter.device)
+    where = f"{ms.threads} thread(s)" if evaluation.segmenter.device == "cpu" else str(evaluation.segmenter.device)
     times = f"{ms.median:.1f} ms in the median, {ms.p95:.1f} ms in the 95th percentile"
     return f"{table}\n\nTime a frame, 640x480: {times}, on {where}."
 

@@ -42,7 +42,8 @@ PATHS = ("static", "xyz", "rpy", "halfsphere")
 CATALOG = ("fr3_walking_static", "fr3_walking_xyz", "fr3_walking_rpy", "fr3_walking_halfsphere", "fr3_sitting_xyz")
 """Scenarios of the catalog that are judged as well: their people, outfits, chairs and room are held out."""
 CATALOG_EVERY = 60
-LONGEST_WALK_M = 1.4
+WALK_M = 2.2
+"""Length of a way there and back: people need room to turn."""
 
 
 def held_out_scenario(number: int) -> Scenario:
@@ -118,7 +119,7 @@ def _draw_person(
         chair = _chair(rng, f"seat of {name}", (*disc[:2], heading))
         acts = (SitAct(duration_s=3600.0),)
     elif act == "walk" and (way := _free_way(rng, disc, places)) is not None:
-        start = float(rng.uniform(0.0, LONGEST_WALK_M))
+        start = float(rng.uniform(0.0, WALK_M))
         acts = (WalkLoopAct(waypoints_m=(way,), closed=False, speed_m_s=float(rng.uniform(0.6, 1.5)), start_m=start),)
     person = PersonSpec(
         name=name,
@@ -135,8 +136,8 @@ def _draw_person(
 def _free_way(rng: np.random.Generator, disc: Disc, places: Places) -> tuple[float, float] | None:
     """Where one can walk to in a straight line from a disc."""
     for angle in rng.uniform(0, 2 * math.pi, 12).tolist():
-        ahead = LONGEST_WALK_M * np.array([math.cos(angle), math.sin(angle)])
-        if all(places.is_free(*(disc[:2] + share * ahead), disc[2]) for share in (0.25, 0.5, 0.75, 1.0)):
+        ahead = WALK_M * np.array([math.cos(angle), math.sin(angle)])
+        if all(places.is_free(*(disc[:2] + share * ahead), disc[2]) for share in (0.2, 0.4, 0.6, 0.8, 1.0)):
             x, y = (disc[:2] + ahead).tolist()
             return x, y
     return None

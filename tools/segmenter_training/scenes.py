@@ -128,11 +128,11 @@ def build_scene(seed: int, number: int) -> TrainingScene:
     varied = [varied_thing(thing, rng, 0.5) for thing in props]
     objects = (*furniture, *dressed, *varied)
     lights = tuple(
-        Light(position_world=light.position_world, power=light.power * float(rng.uniform(0.4, 1.6)))
+        Light(position_world=light.position_world, power=light.power * float(rng.uniform(0.5, 2.0)))
         for light in room.lights
     )
     return TrainingScene(
-        scene=Scene(objects=objects, lights=lights, ambient=float(rng.uniform(0.2, 0.5))),
+        scene=Scene(objects=objects, lights=lights, ambient=float(rng.uniform(0.22, 0.55))),
         camera=_draw_camera(rng),
         places=Places(room),
         groups=groups,

@@ -9,6 +9,8 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Protocol
 
+import numpy as np
+import numpy.typing as npt
 import torch
 from safetensors.torch import save
 from torch import Tensor
@@ -16,7 +18,7 @@ from torch import Tensor
 from dotmask.atomic_file import write_atomically
 from dotmask.segmentation.yolact.anchors import anchors_of
 from dotmask.segmentation.yolact.design import COMPACT, YolactDesign
-from dotmask.segmentation.yolact.images import network_image
+from dotmask.segmentation.yolact.images import MEAN_RGB, STD_RGB
 from dotmask.segmentation.yolact.loss import Losses, Target, yolact_loss
 from dotmask.segmentation.yolact.network import Answer, Yolact
 from sim.randomness import child
@@ -201,9 +203,15 @@ def _batch(frames: Frames, settings: Settings, design: YolactDesign, step: int) 
     for place, index in enumerate(frames_of_step(step, len(frames), settings)):
         rng = child(settings.seed, "segmenter change", step * settings.batch + place)
         frame = changed(frames[index], draw_change(rng, design.height, design.width), rng)
-        images.append(network_image(frame.rgb, design.height, design.width, torch.device("cpu")))
+        images.append(frame.rgb)
         targets.append(target_of(frame))
-    return torch.cat(images).contiguous(memory_format=torch.channels_last), targets
+    return normalised(np.stack(images)), targets
+
+
+def normalised(images: npt.NDArray[np.uint8]) -> Tensor:
+    """Images (B, H, W, 3) of the network's size as `dotmask.segmentation.yolact.images.network_image` makes each."""
+    mean, std = (torch.tensor(values) for values in (MEAN_RGB, STD_RGB))
+    return ((torch.from_numpy(images).float() - mean) / std).permute(0, 3, 1, 2)
 
 
 def _on(target: Target, device: torch.device) -> Target:
