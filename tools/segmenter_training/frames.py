@@ -6,13 +6,12 @@ is written last and names the class of each label. Label 0 is everything else.
 
 import io
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from functools import lru_cache
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
@@ -66,7 +65,7 @@ def _frame(drawn: TrainingScene, renderer: VisibilityBufferRenderer, rng: np.ran
     return labelled(images, drawn.classes)
 
 
-def labelled(images: RenderedImages, class_of_id: dict[int, int] | Any) -> LabelledFrame:
+def labelled(images: RenderedImages, class_of_id: Mapping[int, int]) -> LabelledFrame:
     """Perfect images as a frame of the training; labels follow the order of the instance ids.
 
     Args:
@@ -161,7 +160,7 @@ class FrameStore:
                 np.load(self._path(number, f"{name}.npy"), mmap_mode="r", allow_pickle=False)
                 for name in ("rgb", "labels")
             )
-        except (OSError, ValueError, KeyError) as error:
+        except (OSError, EOFError, ValueError, KeyError) as error:
             raise TrainingError(
                 f"{self._path(number, 'json')}: scene {number} is missing or damaged ({error}); delete its files and "
                 "run the same command again"

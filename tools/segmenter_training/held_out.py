@@ -136,10 +136,10 @@ def _draw_person(
 def _free_way(rng: np.random.Generator, disc: Disc, places: Places) -> tuple[float, float] | None:
     """Where one can walk to in a straight line from a disc."""
     for angle in rng.uniform(0, 2 * math.pi, 12).tolist():
-        ahead = WALK_M * np.array([math.cos(angle), math.sin(angle)])
-        if all(places.is_free(*(disc[:2] + share * ahead), disc[2]) for share in (0.2, 0.4, 0.6, 0.8, 1.0)):
-            x, y = (disc[:2] + ahead).tolist()
-            return x, y
+        ahead = (WALK_M * math.cos(angle), WALK_M * math.sin(angle))
+        way = [(disc[0] + share * ahead[0], disc[1] + share * ahead[1]) for share in (0.2, 0.4, 0.6, 0.8, 1.0)]
+        if all(places.is_free(x, y, disc[2]) for x, y in way):
+            return way[-1]
     return None
 
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
+from sim.geometry import FloatArray
 from sim.scene import SceneObject, Surface
 from sim.things import textures
 from sim.things.textures import Image
@@ -82,13 +83,13 @@ def pattern(rng: np.random.Generator) -> Image:
     if kind == 4:
         image[textures.noise(rng, shape, float(rng.uniform(4, 20)), octaves=3) > rng.uniform(0.2, 1.0)] = second
     shade = 1 + np.float32(0.1) * textures.noise(rng, shape, 12, octaves=4)
-    return np.clip(image * shade[..., None], 0, 255).astype(np.uint8)
+    return np.asarray(np.clip(image * shade[..., None], 0, 255), np.uint8)
 
 
 def _varied(surface: Surface, rng: np.random.Generator, share: float) -> Surface:
     return replace(surface, texture=recoloured(surface.texture, rng)) if rng.random() < share else surface
 
 
-def _scaled(texture: Image, factors: np.ndarray) -> Image:
+def _scaled(texture: Image, factors: FloatArray) -> Image:
     table = np.clip(np.arange(256)[:, None] * factors, 0, 255).astype(np.uint8)[:, None]
     return np.asarray(cv2.LUT(texture, table), np.uint8)
