@@ -13,9 +13,8 @@ from dotmask.segmentation.yolact.loss import Target
 from sim.randomness import child
 from tools.segmenter_training.frames import LabelledFrame
 
-LEAST_PX = 16
-"""An instance with fewer pixels of the network's image is nothing to be found; the judge begins at 80 of 640x480, which
-are 20."""
+LEAST_PX = 20
+"""An instance with fewer pixels of the network's image is nothing to be found: the judge begins at 80 of 640x480."""
 MASK_SHARE = 4
 """Masks have a quarter of the image's height and width: as many pixels as the prototypes."""
 
