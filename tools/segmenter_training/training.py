@@ -109,7 +109,7 @@ def train(
     device = torch.device(settings.device)
     torch.manual_seed(settings.seed)
     network = Yolact(design).to(device).to(memory_format=torch.channels_last).train()  # type: ignore[call-overload]
-    optimiser = torch.optim.AdamW(_parameter_groups(network), lr=settings.peak_rate, fused=True)
+    optimiser = torch.optim.AdamW(_parameter_groups(network), lr=settings.peak_rate)
     averaged = AveragedWeights(network)
     anchors = anchors_of(design).to(device)
     first, earlier_s, rows = 0, 0.0, []
