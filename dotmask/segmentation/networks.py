@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from dotmask.assets import asset_file
 from dotmask.errors import SegmenterError
 from dotmask.interfaces import Segmenter
 
@@ -16,6 +17,9 @@ if TYPE_CHECKING:
 
 NETWORKS = ("compact", "mask_rcnn", "yolact", "yolact++")
 DEVICES = ("cpu", "cuda")
+
+WEIGHTS_OF_COMPACT = "segmenter/compact.safetensors"
+"""The asset; `tools/train_segmenter.py` makes it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,7 +44,8 @@ def choose_network(name: str, weights: Path | None, device: str) -> NetworkChoic
 
     Args:
         name: of `NETWORKS`.
-        weights: the file; of `mask_rcnn` None for the one that torchvision has downloaded before.
+        weights: the file; None for the one that comes with `compact`, and of `mask_rcnn` for the one that torchvision
+            has downloaded before.
         device: of `DEVICES`.
 
     Raises:
@@ -130,6 +135,14 @@ def _check_installed(name: str) -> None:
 
 
 def _own_weights(name: str) -> Path:
+    if name == "compact":
+        shipped = asset_file(WEIGHTS_OF_COMPACT)
+        if shipped is None:
+            raise SegmenterError(
+                f"--segmenter compact: this version comes without its weights ({WEIGHTS_OF_COMPACT} of the assets); "
+                "name a file with --weights, or make one with python -m tools.train_segmenter"
+            )
+        return shipped
     if name != "mask_rcnn":
         raise SegmenterError(f"--segmenter {name}: no weights come with it; name a file with --weights")
     from dotmask.segmentation.mask_rcnn import PUBLISHED, cached_weights

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from dotmask.assets import asset_file, asset_places
 from dotmask.errors import VocabularyError
 from dotmask.records import checked
 from dotmask.slam.features import Descriptors
@@ -101,17 +102,14 @@ class Vocabulary:
 def load_vocabulary() -> Vocabulary:
     """The vocabulary that comes with the package; `tools/train_vocabulary` makes it.
 
-    A checkout has it in `assets/` beside the package, an installed wheel in `dotmask/_assets`.
-
     Raises:
         VocabularyError: the file is missing or damaged.
     """
-    package = Path(__file__).resolve().parent.parent
-    candidates = (package.parent / "assets" / FILE, package / "_assets" / FILE)
-    for path in candidates:
-        if path.is_file():
-            return read_vocabulary(path)
-    raise VocabularyError(f"no visual vocabulary in {candidates[0]} or {candidates[1]}: reinstall the package")
+    path = asset_file(FILE)
+    if path is None:
+        missing = " or ".join(str(place) for place in asset_places(FILE))
+        raise VocabularyError(f"no visual vocabulary in {missing}: reinstall the package")
+    return read_vocabulary(path)
 
 
 def read_vocabulary(path: Path) -> Vocabulary:

@@ -1,5 +1,6 @@
 """The verb that judges a segmenter: evaluate-segmenter."""
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -17,7 +18,10 @@ def evaluate_segmenter(
             show_default=False,
         ),
     ],
-    scenarios: Annotated[str, typer.Option(metavar="A,B,...", help="Comma-separated scenarios.", show_default=False)],
+    scenarios: Annotated[
+        str,
+        typer.Option(metavar="A,B,...", help="Comma-separated scenarios, or scenario.json files.", show_default=False),
+    ],
     weights: Weights = None,
     device: Device = None,
     profile: Annotated[
@@ -46,7 +50,12 @@ def evaluate_segmenter(
     names = dict.fromkeys(part.strip() for part in scenarios.split(",") if part.strip())
     if not names:
         raise ScenarioError(f"--scenarios {scenarios}: name at least one; `dotmask list` does")
-    chosen = [resolve(one, None, overrides, seed, frames) for one in names]
+    chosen = [
+        resolve(None, Path(one), overrides, seed, frames)
+        if one.endswith(".json")
+        else resolve(one, None, overrides, seed, frames)
+        for one in names
+    ]
     with progress_bar() as progress:
         total = sum(len(frames_of(scenario, max(every, 1))) for scenario in chosen)
         task = progress.add_task(f"evaluate {name}", total=total)

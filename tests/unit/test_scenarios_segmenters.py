@@ -117,7 +117,6 @@ def test_a_sweep_gives_weights_to_the_networks_among_its_segmenters(weights: Pat
 BAD_INPUT = [
     (["--segmenter", "yolcat"], "unknown segmenter 'yolcat'. Did you mean yolact"),
     (["--segmenter", "yolact"], "--segmenter yolact: no weights come with it; name a file with --weights"),
-    (["--segmenter", "compact"], "--segmenter compact: no weights come with it"),
     (["--segmenter", "yolact", "--weights", "none.pth"], "none.pth: cannot be read (No such file"),
     (["--segmenter", "yolact", "--weights", "none.pth", "--device", "gpu"], "unknown device 'gpu'"),
     (["--segmenter", "oracle", "--weights", "none.pth"], "--weights and --device are for networks ("),

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dotmask import assets
 from dotmask.errors import VocabularyError
-from dotmask.slam import vocabulary as module
 from dotmask.slam.vocabulary import Vocabulary, load_vocabulary, read_vocabulary
 from tools.asset_files import write_npz
 from tools.train_vocabulary.clusters import k_majority, tree
@@ -120,7 +120,7 @@ def test_a_damaged_file_says_what_to_do(tmp_path: Path, arrays: dict[str, np.nda
 
 def test_a_wheel_has_the_file_inside_the_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     package = tmp_path / "dotmask"
-    monkeypatch.setattr(module, "__file__", str(package / "slam" / "vocabulary.py"))
+    monkeypatch.setattr(assets, "__file__", str(package / "assets.py"))
     load_vocabulary.cache_clear()
     try:
         with pytest.raises(VocabularyError, match="reinstall"):

@@ -1,0 +1,1 @@
+"""Trains the network `compact` on rendered frames: what it may see, scenes, frames, the loop, the test, the card."""
