@@ -27,10 +27,13 @@ def enclosing_rectangle(mask: MaskImage, expected_px: FloatArray | None) -> tupl
     if expected_px is not None:
         u_min, v_min, u_max, v_max = expected_px.tolist()
         left, top = max(int(u_min), 0), max(int(v_min), 0)
-        pixels = mask.view(np.uint8)
-        part = pixels[top : max(int(v_max) + 1, 0), left : max(int(u_max) + 1, 0)]
-        if part.size and cv2.countNonZero(part) == cv2.countNonZero(pixels):
-            return left, top, part.shape[1], part.shape[0]
+        right, bottom = min(int(u_max) + 1, mask.shape[1]), min(int(v_max) + 1, mask.shape[0])
+        if left < right and top < bottom:
+            pixels = mask.view(np.uint8)
+            rows = pixels[top:bottom]
+            outside = pixels[:top], pixels[bottom:], rows[:, :left], rows[:, right:]
+            if not any(part.size and cv2.hasNonZero(part) for part in outside):
+                return left, top, right - left, bottom - top
     return bounding_rectangle(mask)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from dotmask.geometry import back_project
 from dotmask.profiles import Profile
 from dotmask.records import DepthImage, Detections, FloatArray, Intrinsics, MaskImage, Observation, RgbdFrame
-from dotmask.tracking.measurement_kernels import hidden_objects, mean_depth, median_depth
+from dotmask.tracking.measurement_kernels import hidden_objects, mean_depth, median_depth, sampled_depths
 from dotmask.tracking.measurement_model import CAMERA_POINT, PixelDepth
 from dotmask.tracking.measurement_noise import (
     box_centre_variance,
@@ -140,20 +140,20 @@ def _depth(mask: MaskImage, depth_m: DepthImage, profile: Profile) -> tuple[floa
 
 def _sampled_depth(mask: MaskImage, depth_m: DepthImage, step: int, profile: Profile) -> tuple[float, float] | None:
     """As `_depth`, from every so many-th pixel of every so many-th row."""
+    samples = sampled_depths(mask, depth_m, step, _LEAST_DEPTH_M, _MOST_DEPTH_M)
     is_median = profile.measurement == "mask_centroid"
     nearest, farthest = _LEAST_DEPTH_M, _MOST_DEPTH_M
     if profile.depth_trim_m is not None:
-        coarse = step if is_median else step * _step(mask.size // step**2, _MEDIAN_SAMPLES)
-        middle, samples = median_depth(mask, depth_m, coarse, nearest, farthest)
-        if samples:
+        middle, count = median_depth(samples, 1 if is_median else _step(mask.size // step**2, _MEDIAN_SAMPLES))
+        if count:
             nearest = max(middle - profile.depth_trim_m, nearest)
             farthest = min(middle + profile.depth_trim_m, farthest)
-    pixels, mean, spread = mean_depth(mask, depth_m, step, nearest, farthest)
+    pixels, mean, spread = mean_depth(samples, nearest, farthest)
     if pixels < profile.min_depth_pixels:
         return None
     if is_median:
-        median, samples = median_depth(mask, depth_m, step, _LEAST_DEPTH_M, _MOST_DEPTH_M)
-        return median, median_depth_variance(median, samples, profile.noise)
+        median, count = median_depth(samples, 1)
+        return median, median_depth_variance(median, count, profile.noise)
     return mean, mean_depth_variance(mean, spread, pixels, profile.noise)
 
 

@@ -17,56 +17,67 @@ OTHER_MARGIN_M = 0.02
 
 
 @njit(cache=True, nogil=True)
-def median_depth(mask, depth_m, step, nearest_m, farthest_m):
-    """The upper median of the depths under a mask, metres, and how many they are; 0 and 0 without any.
+def sampled_depths(mask, depth_m, step, nearest_m, farthest_m):
+    """(rows, columns) float32, the depth of every so many-th pixel of every so many-th row; 0 is none, or not the mask.
 
     Args:
         mask: (H, W) bool.
         depth_m: (H, W) float32.
-        step: every so many-th pixel of every so many-th row is looked at.
+        step: between the pixels.
         nearest_m: what lies outside of this and
         farthest_m: this is no depth.
     """
     rows, columns = (mask.shape[0] + step - 1) // step, (mask.shape[1] + step - 1) // step
-    depths = np.empty(rows * columns, np.float32)
-    count = 0
+    samples = np.zeros((rows, columns), np.float32)
     for i in range(rows):
         for j in range(columns):
             if mask[i * step, j * step]:
                 depth = depth_m[i * step, j * step]
                 if nearest_m <= depth <= farthest_m:
-                    depths[count] = depth
-                    count += 1
+                    samples[i, j] = depth
+    return samples
+
+
+@njit(cache=True, nogil=True)
+def median_depth(samples, step):
+    """The upper median of depths, metres, and how many they are; 0 and 0 without any.
+
+    Args:
+        samples: (rows, columns) float32, 0 is none.
+        step: every so many-th of every so many-th row is looked at.
+    """
+    depths = np.empty(samples.size, np.float32)
+    count = 0
+    for i in range(0, samples.shape[0], step):
+        for j in range(0, samples.shape[1], step):
+            if samples[i, j] > 0:
+                depths[count] = samples[i, j]
+                count += 1
     if count == 0:
         return 0.0, 0
     return float(np.partition(depths[:count], count // 2)[count // 2]), count
 
 
 @njit(cache=True, nogil=True)
-def mean_depth(mask, depth_m, step, nearest_m, farthest_m):
-    """How many depths lie under a mask, their mean (metres), and the sum of squares of its outline's about it (m²).
+def mean_depth(samples, nearest_m, farthest_m):
+    """How many depths there are, their mean (metres), and the sum of squares of the outline's about it (m²).
 
-    The outline: pixels of which one that touches by a side is not of the mask, or is without depth.
+    The outline: samples of which one that touches by a side is missing.
 
     Args:
-        mask: (H, W) bool.
-        depth_m: (H, W) float32.
-        step: every so many-th pixel of every so many-th row is looked at.
+        samples: (rows, columns) float32, 0 is none.
         nearest_m: what lies outside of this and
-        farthest_m: this is no depth.
+        farthest_m: this does not count.
     """
-    rows, columns = (mask.shape[0] + step - 1) // step, (mask.shape[1] + step - 1) // step
+    rows, columns = samples.shape
     is_used = np.zeros((rows + 2, columns + 2), np.bool_)
-    depths = np.empty((rows, columns), np.float32)
     pixels, total = 0, 0.0
     for i in range(rows):
         for j in range(columns):
-            depth = depth_m[i * step, j * step]
-            depths[i, j] = depth
-            if mask[i * step, j * step] and nearest_m <= depth <= farthest_m:
+            if samples[i, j] > 0 and nearest_m <= samples[i, j] <= farthest_m:
                 is_used[i + 1, j + 1] = True
                 pixels += 1
-                total += depth
+                total += samples[i, j]
     if pixels == 0:
         return 0, 0.0, 0.0
     mean, spread = total / pixels, 0.0
@@ -75,7 +86,7 @@ def mean_depth(mask, depth_m, step, nearest_m, farthest_m):
             if is_used[i, j] and not (
                 is_used[i - 1, j] and is_used[i + 1, j] and is_used[i, j - 1] and is_used[i, j + 1]
             ):
-                spread += (depths[i - 1, j - 1] - mean) ** 2
+                spread += (samples[i - 1, j - 1] - mean) ** 2
     return pixels, mean, spread
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from dotmask.tracking.measurement_kernels import hidden_objects, mean_depth, median_depth
+from dotmask.tracking.measurement_kernels import hidden_objects, mean_depth, median_depth, sampled_depths
 
 SHAPE = (60, 80)
 
@@ -22,13 +22,17 @@ def scene(seed):
 @pytest.mark.parametrize("seed", range(4))
 def test_median_and_mean_are_those_of_the_depths_under_the_mask(seed, step) -> None:
     mask, depth = scene(seed)
-    part, under = mask[::step, ::step], depth[::step, ::step]
-    is_used = part & (under >= 1.7) & (under <= 2.5)
-    median, count = median_depth(mask, depth, step, 1.7, 2.5)
-    assert count == np.count_nonzero(is_used)
-    assert median == np.sort(under[is_used])[count // 2]
-    pixels, mean, spread = mean_depth(mask, depth, step, 1.7, 2.5)
-    assert pixels == count
+    under = np.where(mask & (depth >= 1.6) & (depth <= 2.7), depth, 0)[::step, ::step]
+    samples = sampled_depths(mask, depth, step, 1.6, 2.7)
+    np.testing.assert_array_equal(samples, under)
+    for every in (1, 2):
+        some = under[::every, ::every]
+        median, count = median_depth(samples, every)
+        assert count == np.count_nonzero(some)
+        assert median == np.sort(some[some > 0])[count // 2]
+    is_used = (under >= 1.7) & (under <= 2.5)
+    pixels, mean, spread = mean_depth(samples, 1.7, 2.5)
+    assert pixels == np.count_nonzero(is_used)
     assert mean == pytest.approx(under[is_used].mean(dtype=np.float64), abs=1e-9)
     outline = is_used & ~ndimage.binary_erosion(is_used)
     assert spread == pytest.approx(((under[outline].astype(float) - mean) ** 2).sum(), rel=1e-9)
@@ -36,8 +40,9 @@ def test_median_and_mean_are_those_of_the_depths_under_the_mask(seed, step) -> N
 
 def test_without_depth_there_is_neither() -> None:
     mask, depth = np.ones(SHAPE, bool), np.zeros(SHAPE, np.float32)
-    assert median_depth(mask, depth, 1, 0.1, 9.0) == (0.0, 0)
-    assert mean_depth(mask, depth, 1, 0.1, 9.0) == (0, 0.0, 0.0)
+    samples = sampled_depths(mask, depth, 1, 0.1, 9.0)
+    assert median_depth(samples, 1) == (0.0, 0)
+    assert mean_depth(samples, 0.1, 9.0) == (0, 0.0, 0.0)
 
 
 def box(u0, u1, v0, v1):

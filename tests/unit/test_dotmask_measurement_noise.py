@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dotmask.profiles import CALIBRATED, PAPER
-from dotmask.tracking.measurement_kernels import mean_depth
+from dotmask.tracking.measurement_kernels import mean_depth, sampled_depths
 from dotmask.tracking.measurement_noise import (
     box_centre_variance,
     centroid_variance,
@@ -79,7 +79,7 @@ def test_mean_and_median_of_many_depths_err_as_predicted(depth_m) -> None:
     mask, means, medians = np.ones((40, 40), bool), [], []
     for true_m in depth_m + rng.uniform(-0.1, 0.1, 1500):
         depth = noisy(np.full((40, 40), true_m), rng)
-        pixels, mean, spread = mean_depth(mask, depth, 1, 0.1, 9.0)
+        pixels, mean, spread = mean_depth(sampled_depths(mask, depth, 1, 0.1, 9.0), 0.1, 9.0)
         means.append((mean - true_m) ** 2 / mean_depth_variance(true_m, spread, pixels, fine))
         middle = np.sort(depth.ravel())[800]
         medians.append((middle - true_m) ** 2 / median_depth_variance(true_m, 1600, fine))
@@ -95,7 +95,7 @@ def test_a_deep_object_whose_outline_is_far_away_has_an_uncertain_mean() -> None
     errors = []
     for centre, disc in discs(800, 41.7):
         errors.append((2.0 + radius * ((U - centre[0]) ** 2 + (V - centre[1]) ** 2) / 41.7**2)[disc].mean())
-    pixels, mean, spread = mean_depth(mask, bowl, 1, 0.1, 9.0)
+    pixels, mean, spread = mean_depth(sampled_depths(mask, bowl, 1, 0.1, 9.0), 0.1, 9.0)
     one = mean_depth_variance(mean, spread, pixels, noise)
     # One radius: see Gauss's circle problem above.
     assert one == pytest.approx(np.var(errors), rel=0.6)
