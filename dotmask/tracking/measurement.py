@@ -143,16 +143,16 @@ def _sampled_depth(mask: MaskImage, depth_m: DepthImage, step: int, profile: Pro
     samples = sampled_depths(mask, depth_m, step, _LEAST_DEPTH_M, _MOST_DEPTH_M)
     is_median = profile.measurement == "mask_centroid"
     nearest, farthest = _LEAST_DEPTH_M, _MOST_DEPTH_M
-    if profile.depth_trim_m is not None:
-        middle, count = median_depth(samples, 1 if is_median else _step(mask.size // step**2, _MEDIAN_SAMPLES))
-        if count:
-            nearest = max(middle - profile.depth_trim_m, nearest)
-            farthest = min(middle + profile.depth_trim_m, farthest)
+    median, count = 0.0, 0
+    if is_median or profile.depth_trim_m is not None:
+        median, count = median_depth(samples, 1 if is_median else _step(mask.size // step**2, _MEDIAN_SAMPLES))
+    if count and profile.depth_trim_m is not None:
+        nearest = max(median - profile.depth_trim_m, nearest)
+        farthest = min(median + profile.depth_trim_m, farthest)
     pixels, mean, spread = mean_depth(samples, nearest, farthest)
     if pixels < profile.min_depth_pixels:
         return None
     if is_median:
-        median, count = median_depth(samples, 1)
         return median, median_depth_variance(median, count, profile.noise)
     return mean, mean_depth_variance(mean, spread, pixels, profile.noise)
 
