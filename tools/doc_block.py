@@ -27,6 +27,11 @@ def write_block(path: Path, name: str, command: str, text: str) -> None:
     path.write_text(marks.sub(lambda _: block, document), encoding="utf-8")
 
 
+def figure(value: float | None, scale: float, digits: int) -> str:
+    """A number as a table shows it; "-" when it was not measured."""
+    return "-" if value is None else f"{scale * value:.{digits}f}"
+
+
 def markdown_table(header: list[str], rows: list[list[str]]) -> str:
     """A Markdown table."""
     lines = [header, ["---"] * len(header), *rows]

@@ -18,7 +18,7 @@ from scenarios.run import RunSettings
 from scenarios.spec import with_overrides
 from scenarios.sweep.cells import Cell, Done, run_and_keep
 from scenarios.sweep.executors import cores, run_local
-from tools.doc_block import markdown_table, write_block
+from tools.doc_block import figure, markdown_table, write_block
 
 PAGE = Path(__file__).parent.parent / "docs" / "mapping.md"
 PICTURE = PAGE.with_name("map.png")
@@ -50,11 +50,6 @@ def maps(done: Done) -> dict[str, MapReport]:
     """The figures of the maps by method."""
     assert done.result.report is not None
     return {method: figures.map for method, figures in done.result.report.methods.items()}
-
-
-def figure(value: float | None, scale: float, digits: int) -> str:
-    """A number as the table shows it; "-" when it was not measured."""
-    return "-" if value is None else f"{scale * value:.{digits}f}"
 
 
 def row(name: str, frames: int, people: dict[str, MapReport], empty: MapReport) -> list[str]:

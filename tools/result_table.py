@@ -16,7 +16,7 @@ from scenarios.report import Report
 from scenarios.run import RunSettings
 from scenarios.spec import with_overrides
 from scenarios.sweep.cells import Cell
-from tools.doc_block import markdown_table, write_block
+from tools.doc_block import figure, markdown_table, write_block
 from tools.finished_cells import reports
 
 PAGE = Path(__file__).parent.parent / "README.md"
@@ -32,11 +32,6 @@ HEADER = [
     "leak, %",
     "waste, %",
 ]
-
-
-def figure(value: float | None, scale: float, digits: int) -> str:
-    """A number as the table shows it; "-" when it was not measured."""
-    return "-" if value is None else f"{scale * value:.{digits}f}"
 
 
 def row(report: Report) -> list[str]:
