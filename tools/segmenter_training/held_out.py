@@ -26,7 +26,7 @@ from scenarios.spec import (
 from scenarios.world import ROOMS
 from sim.people.characters import CHARACTERS
 from sim.randomness import child
-from tools.segmenter_training.places import Disc, Places
+from tools.segmenter_training.places import Disc, Places, is_apart
 from tools.segmenter_training.split import (
     FIRST_HELD_OUT_SEED,
     HELD_OUT_CHAIRS,
@@ -150,7 +150,7 @@ def _chair(rng: np.random.Generator, name: str, at: tuple[float, float, float]) 
 
 def _draw_chair(rng: np.random.Generator, name: str, places: Places, taken: list[Disc]) -> list[ThingSpec]:
     at_desk = places.at_desk(rng) if rng.random() < 0.6 else None
-    if at_desk is not None and all(math.hypot(at_desk[0] - x, at_desk[1] - y) > 0.3 + r for x, y, r in taken):
+    if at_desk is not None and is_apart((*at_desk[:2], 0.3), taken):
         taken.append((*at_desk[:2], 0.3))
         return [_chair(rng, name, (*at_desk[:2], math.degrees(at_desk[2])))]
     disc = places.on_floor(rng, 0.3, taken)

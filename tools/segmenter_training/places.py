@@ -13,6 +13,8 @@ TRIES = 40
 DESK_TOPS_M = (0.6, 0.9)
 """Between these heights lies the top of a desk."""
 STEEPEST_RAD = math.radians(65)
+CAMERA_RADIUS_M = 0.15
+"""So far a camera stays away from people."""
 
 Disc = tuple[float, float, float]
 """x, y and radius of what is taken on the floor, metres."""
@@ -37,9 +39,7 @@ class Places:
         """A disc of this radius that touches neither furniture nor what is taken; None where none was found."""
         for _ in range(TRIES):
             x, y = rng.uniform(self._low, self._high).tolist()
-            if self.is_free(x, y, radius_m) and all(
-                math.hypot(x - other[0], y - other[1]) > radius_m + other[2] for other in taken
-            ):
+            if self.is_free(x, y, radius_m) and is_apart((x, y, radius_m), taken):
                 return x, y, radius_m
         return None
 
@@ -104,7 +104,7 @@ class Places:
             ahead = gaze - eye
             if (
                 self.holds(eye)
-                and all(math.hypot(eye[0] - x, eye[1] - y) > radius + 0.15 for x, y, radius in people)
+                and is_apart((eye[0], eye[1], CAMERA_RADIUS_M), people)
                 and abs(ahead[2]) < math.tan(STEEPEST_RAD) * math.hypot(ahead[0], ahead[1])
             ):
                 return look_at(eye, gaze)
@@ -114,6 +114,11 @@ class Places:
         """Whether a camera may be at a position (3,): in the room, and not in its furniture."""
         is_inside = bool(np.all(self._low < position_world[:2]) and np.all(self._high > position_world[:2]))
         return is_inside and self._space.holds(position_world)
+
+
+def is_apart(disc: Disc, taken: Sequence[Disc]) -> bool:
+    """Whether a disc touches none of those that are taken."""
+    return all(math.hypot(disc[0] - x, disc[1] - y) > disc[2] + radius for x, y, radius in taken)
 
 
 def rolled(T_world_camera: FloatArray, angle_rad: float) -> FloatArray:

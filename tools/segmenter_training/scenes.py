@@ -31,7 +31,7 @@ from sim.randomness import child
 from sim.records import CameraModel, Moment
 from sim.scene import Light, Scene, SceneObject
 from tools.segmenter_training.looks import tinted_thing, varied_person, varied_thing
-from tools.segmenter_training.places import Disc, Places, rolled
+from tools.segmenter_training.places import Disc, Places, is_apart, rolled
 from tools.segmenter_training.split import CLASSES, SHARED_LOOKS, TRAINING_CHAIRS, TRAINING_CHARACTERS
 from tools.train_vocabulary.rooms import random_room
 
@@ -268,7 +268,7 @@ def _put(
         return pose(turn, [*disc[:2], 0.0])
     if (group.kind == "chair" or group.radius_m == SEATED_RADIUS_M) and rng.random() < 0.5:
         at_desk = places.at_desk(rng)
-        if at_desk is not None and _is_apart((*at_desk[:2], group.radius_m), taken):
+        if at_desk is not None and is_apart((*at_desk[:2], group.radius_m), taken):
             # At the origin a chair is headed along +x.
             _take((*at_desk[:2], group.radius_m), group, taken, people)
             return pose(rotation_z(at_desk[2]), [*at_desk[:2], 0.0])
@@ -283,10 +283,6 @@ def _take(disc: Disc, group: Group, taken: list[Disc], people: list[Disc]) -> No
     taken.append(disc)
     if group.kind == "person":
         people.append(disc)
-
-
-def _is_apart(disc: Disc, taken: list[Disc]) -> bool:
-    return all(math.hypot(disc[0] - x, disc[1] - y) > disc[2] + radius for x, y, radius in taken)
 
 
 def _stretched(rng: np.random.Generator) -> FloatArray:
