@@ -4,9 +4,9 @@ from pathlib import Path
 
 
 def asset_places(name: str) -> tuple[Path, ...]:
-    """Where the file `name` may lie: in `assets/` beside the package in a checkout, in `dotmask/_assets` of a wheel."""
-    package = Path(__file__).resolve().parent
-    return package.parent / "assets" / name, package / "_assets" / name
+    """Where the file `name` may lie: beside the package in `assets/` of a checkout, in `dotmask_assets/` of a wheel."""
+    beside = Path(__file__).resolve().parents[1]
+    return beside / "assets" / name, beside / "dotmask_assets" / name
 
 
 def asset_file(name: str) -> Path | None:

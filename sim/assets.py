@@ -1,6 +1,6 @@
 """The committed data files, and the manifest that says where each comes from and what its bytes are.
 
-A checkout has them in `assets/` beside the package, an installed wheel in `sim/_assets`.
+They lie beside the package: in `assets/` of a checkout, in `dotmask_assets/` of a wheel.
 """
 
 import difflib
@@ -52,13 +52,13 @@ class AssetRecord:
 
 
 def asset_root() -> Path:
-    """The folder of the assets: `assets/` beside the package when it holds a manifest, else `sim/_assets`.
+    """The folder of the assets: `assets/` beside the package when it holds a manifest, else `dotmask_assets/`.
 
     Raises:
         AssetError: neither holds a manifest.
     """
-    package = Path(__file__).resolve().parent
-    candidates = (package.parent / "assets", package / "_assets")
+    beside = Path(__file__).resolve().parents[1]
+    candidates = (beside / "assets", beside / "dotmask_assets")
     for folder in candidates:
         if (folder / MANIFEST).is_file():
             return folder

@@ -293,14 +293,13 @@ def test_frames_come_back_from_disk_and_what_is_missing_is_said(toys: list[Label
 def test_compact_without_weights_takes_the_asset_or_says_that_there_is_none(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    package = tmp_path / "dotmask"
-    monkeypatch.setattr(assets, "__file__", str(package / "assets.py"))
+    monkeypatch.setattr(assets, "__file__", str(tmp_path / "dotmask" / "assets.py"))
     with pytest.raises(SegmenterError, match=r"comes without its weights .*; name a file with --weights, or make one"):
         choose_network("compact", None, "cpu")
-    for place in (package / "_assets", tmp_path / "assets"):
-        path = place / WEIGHTS_OF_COMPACT
+    for place in ("dotmask_assets", "assets"):
+        path = tmp_path / place / WEIGHTS_OF_COMPACT
         path.parent.mkdir(parents=True)
-        path.write_bytes(place.name.encode())
+        path.write_bytes(place.encode())
         assert choose_network("compact", None, "cpu").weights == path, "a checkout goes before a wheel"
 
 

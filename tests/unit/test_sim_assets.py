@@ -98,14 +98,16 @@ def test_a_broken_manifest_says_what_to_do(folder: Path, text: str) -> None:
         verify_assets()
 
 
-def test_a_package_without_a_checkout_uses_its_own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    package = tmp_path / "sim"
-    (package / "_assets").mkdir(parents=True)
+def test_a_package_without_a_checkout_uses_the_folder_of_the_wheel(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    installed = tmp_path / "dotmask_assets"
+    installed.mkdir()
     (tmp_path / "assets").mkdir()  # somebody else's folder: no manifest
-    monkeypatch.setattr(assets, "__file__", str(package / "assets.py"))
+    monkeypatch.setattr(assets, "__file__", str(tmp_path / "sim" / "assets.py"))
     with pytest.raises(AssetError, match="no asset manifest"):
         asset_root()
-    (package / "_assets" / "manifest.json").write_text("{}")
-    assert asset_root() == package / "_assets"
+    (installed / "manifest.json").write_text("{}")
+    assert asset_root() == installed
     (tmp_path / "assets" / "manifest.json").write_text("{}")
     assert asset_root() == tmp_path / "assets"

@@ -118,16 +118,15 @@ def test_a_damaged_file_says_what_to_do(tmp_path: Path, arrays: dict[str, np.nda
         read_vocabulary(tmp_path / "words.npz")
 
 
-def test_a_wheel_has_the_file_inside_the_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    package = tmp_path / "dotmask"
-    monkeypatch.setattr(assets, "__file__", str(package / "assets.py"))
+def test_a_wheel_has_the_file_beside_the_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(assets, "__file__", str(tmp_path / "dotmask" / "assets.py"))
     load_vocabulary.cache_clear()
     try:
         with pytest.raises(VocabularyError, match="reinstall"):
             load_vocabulary()
         vocabulary = small_vocabulary(np.random.default_rng(5))
         arrays = {"level_0": vocabulary.levels[0], "level_1": vocabulary.levels[1], "idf": vocabulary.idf}
-        write_npz(package / "_assets" / "slam" / "vocabulary.npz", arrays)
+        write_npz(tmp_path / "dotmask_assets" / "slam" / "vocabulary.npz", arrays)
         assert len(load_vocabulary()) == 9
     finally:
         load_vocabulary.cache_clear()
