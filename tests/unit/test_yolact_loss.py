@@ -101,13 +101,14 @@ def test_the_loss_by_slow_sums() -> None:
         for difference in (answer.offsets[0, i] - encode(boxes[box[i]], anchors[i])).abs().tolist():
             of_boxes += difference - 0.5 if difference > 1 else difference**2 / 2
         x1, y1, x2, y2 = (boxes[box[i]] * torch.tensor([16, 12, 16, 12])).tolist()
-        total = 0.0
+        total, pixels = 0.0, 0
         for v in range(12):
             for u in range(16):
                 if y1 - 1 <= v < y2 + 1 and x1 - 1 <= u < x2 + 1:
+                    pixels += 1
                     share = torch.sigmoid(answer.prototypes[0, v, u] @ answer.coefficients[0, i]).item()
                     total -= math.log(share if small[box[i], v, u] else 1 - share)
-        of_masks += total / ((x2 - x1) * (y2 - y1))
+        of_masks += total / pixels
     wanted = torch.zeros(4, 6, 8)
     for number, mask in ((2, masks[0]), (0, masks[1])):
         wanted[number] = mask[1::4, 1::4] + mask[2::4, 1::4] + mask[1::4, 2::4] + mask[2::4, 2::4] > 2

@@ -23,6 +23,9 @@ class YolactDesign:
         has_square_anchors: whether an anchor's height is set to its width: a slip of the authors' program that the
             published YOLACT was trained with, and YOLACT++ was not.
         rescores_masks: whether a score is multiplied with the IoU that a small network expects of the mask (YOLACT++).
+        is_normalised: whether the convolutions behind the backbone are followed by group normalisation (Wu and He, ECCV
+            2018). The published networks begin with a trained backbone and need none; with random weights, half of what
+            follows the backbone would fall silent.
         least_mask_px: masks with fewer pixels of the image are left out.
     """
 
@@ -36,6 +39,7 @@ class YolactDesign:
     aspect_ratios: tuple[float, ...] = (1.0, 0.5, 2.0)
     has_square_anchors: bool = False
     rescores_masks: bool = False
+    is_normalised: bool = False
     least_mask_px: int = 1
 
     @property
@@ -81,9 +85,11 @@ COMPACT = YolactDesign(
     height=240,
     width=320,
     backbone="compact",
-    channels=96,
+    channels=64,
     prototypes=24,
-    scales_px=tuple((scale,) for scale in (14.0, 28.0, 56.0, 112.0, 224.0)),
+    # So large beside the distance of the cells (8 to 128 px) that most objects have several anchors to learn from.
+    scales_px=((18.0, 26.0), (36.0, 52.0), (72.0, 104.0), (144.0, 208.0), (256.0, 340.0)),
     aspect_ratios=(1.0, 0.4, 2.0),
+    is_normalised=True,
 )
 """A small network for two cores without a GPU, and for the paper's four classes alone."""

@@ -4,12 +4,14 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from dotmask.segmentation.yolact.pyramid import convolution
 
-def prototype_network(channels: int, prototypes: int) -> nn.Sequential:
+
+def prototype_network(channels: int, prototypes: int, *, is_normalised: bool) -> nn.Sequential:
     """P3 (B, channels, h, w) to the prototypes before their ReLU (B, prototypes, 2 h, 2 w)."""
 
     def block() -> tuple[nn.Module, nn.Module]:
-        return nn.Conv2d(channels, channels, 3, padding=1), nn.ReLU(inplace=True)
+        return convolution(channels, channels, is_normalised=is_normalised), nn.ReLU(inplace=True)
 
     return nn.Sequential(
         *block(),
@@ -30,12 +32,17 @@ class PredictionHead(nn.Module):
         anchors_a_cell: number of anchors at each place.
         classes: with background.
         prototypes: number of coefficients.
+        is_normalised: see `dotmask.segmentation.yolact.design.YolactDesign`.
     """
 
-    def __init__(self, channels: int, anchors_a_cell: int, classes: int, prototypes: int) -> None:
+    def __init__(
+        self, channels: int, anchors_a_cell: int, classes: int, prototypes: int, *, is_normalised: bool
+    ) -> None:
         super().__init__()
         self._classes, self._prototypes = classes, prototypes
-        self.upfeature = nn.Sequential(nn.Conv2d(channels, channels, 3, padding=1), nn.ReLU(inplace=True))
+        self.upfeature = nn.Sequential(
+            convolution(channels, channels, is_normalised=is_normalised), nn.ReLU(inplace=True)
+        )
         self.bbox_layer = nn.Conv2d(channels, anchors_a_cell * 4, 3, padding=1)
         self.conf_layer = nn.Conv2d(channels, anchors_a_cell * classes, 3, padding=1)
         self.mask_layer = nn.Conv2d(channels, anchors_a_cell * prototypes, 3, padding=1)

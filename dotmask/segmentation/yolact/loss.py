@@ -100,15 +100,15 @@ def yolact_loss(answer: Answer, targets: Sequence[Target], anchors: Tensor) -> L
     positives = max(sum(int((told > 0).sum()) for _, told in matched), 1)
     zero = answer.logits.sum() * 0
     of_classes, of_boxes, of_masks, of_semantic = zero, zero, zero, zero
-    for index, (target, (box, told)) in enumerate(zip(targets, matched, strict=True)):
+    # Taken apart once: the gradient of one image by its index would be as large as that of all of them.
+    images = zip(*(part.unbind() for part in (*answer[:4], answer.semantic)), targets, matched, strict=True)
+    for offsets, logits, coefficients, prototypes, semantic, target, (box, told) in images:
         is_positive = told > 0
-        of_classes = of_classes + _class_loss(answer.logits[index], told)
+        of_classes = of_classes + _class_loss(logits, told)
         wanted = encode(target.boxes[box[is_positive]], anchors[is_positive])
-        of_boxes = of_boxes + functional.smooth_l1_loss(answer.offsets[index, is_positive], wanted, reduction="sum")
-        of_masks = of_masks + _mask_loss(
-            answer.prototypes[index], answer.coefficients[index, is_positive], target, box[is_positive]
-        )
-        of_semantic = of_semantic + _semantic_loss(answer.semantic[index], target)
+        of_boxes = of_boxes + functional.smooth_l1_loss(offsets[is_positive], wanted, reduction="sum")
+        of_masks = of_masks + _mask_loss(prototypes, coefficients[is_positive], target, box[is_positive])
+        of_semantic = of_semantic + _semantic_loss(semantic, target)
     return Losses(
         CLASS_WEIGHT * of_classes / positives,
         BOX_WEIGHT * of_boxes / positives,
@@ -129,7 +129,10 @@ def _class_loss(logits: Tensor, told: Tensor) -> Tensor:
 
 
 def _mask_loss(prototypes: Tensor, coefficients: Tensor, target: Target, box: Tensor) -> Tensor:
-    """Sum over the positives of the mean cross entropy inside the true box."""
+    """Sum over the positives of the mean cross entropy inside the true box and one pixel around it.
+
+    The authors divide by the box alone. With prototypes as few as those of `compact`, a cup would count three times.
+    """
     if not len(box):
         return prototypes.sum() * 0
     scale = 1.0
@@ -143,8 +146,7 @@ def _mask_loss(prototypes: Tensor, coefficients: Tensor, target: Target, box: Te
     left, top, right, bottom = (target.boxes[box] * wanted.new_tensor([width, height, width, height])).T[:, :, None]
     y, x = torch.arange(height, device=box.device), torch.arange(width, device=box.device)
     in_box = ((y >= top - 1) & (y < bottom + 1))[:, :, None] & ((x >= left - 1) & (x < right + 1))[:, None, :]
-    area = ((right - left) * (bottom - top))[:, 0].clamp(min=1.0)
-    summed: Tensor = scale * ((wrong * in_box).sum(dim=(1, 2)) / area).sum()
+    summed: Tensor = scale * ((wrong * in_box).sum(dim=(1, 2)) / in_box.sum(dim=(1, 2))).sum()
     return summed
 
 

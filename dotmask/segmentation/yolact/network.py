@@ -50,10 +50,16 @@ class Yolact(nn.Module):
             if design.backbone == "compact"
             else ResNet50(is_deformable=design.backbone == "resnet50_deformable")
         )
-        self.proto_net = prototype_network(design.channels, design.prototypes)
+        self.proto_net = prototype_network(design.channels, design.prototypes, is_normalised=design.is_normalised)
         self.maskiou_net: MaskIouNet | None = MaskIouNet(classes) if design.rescores_masks else None
-        self.fpn = FeaturePyramid(self.backbone.CHANNELS, design.channels)
-        head = PredictionHead(design.channels, design.anchors_a_cell, classes + 1, design.prototypes)
+        self.fpn = FeaturePyramid(self.backbone.CHANNELS, design.channels, is_normalised=design.is_normalised)
+        head = PredictionHead(
+            design.channels,
+            design.anchors_a_cell,
+            classes + 1,
+            design.prototypes,
+            is_normalised=design.is_normalised,
+        )
         self.prediction_layers = nn.ModuleList([head])
         self.semantic_seg_conv = nn.Conv2d(design.channels, classes, 1)
 

@@ -5,6 +5,15 @@ from collections.abc import Sequence
 from torch import Tensor, nn
 from torch.nn import functional
 
+NORMALISED_TOGETHER = 8
+"""Channels of a group."""
+
+
+def convolution(channels_in: int, channels: int, *, is_normalised: bool) -> nn.Module:
+    """3x3, with group normalisation or without."""
+    layer = nn.Conv2d(channels_in, channels, 3, padding=1)
+    return nn.Sequential(layer, nn.GroupNorm(channels // NORMALISED_TOGETHER, channels)) if is_normalised else layer
+
 
 class FeaturePyramid(nn.Module):
     """Levels P3 to P7 from C3, C4 and C5.
@@ -12,13 +21,16 @@ class FeaturePyramid(nn.Module):
     Args:
         channels_in: of C3, C4 and C5.
         channels: of all levels.
+        is_normalised: see `dotmask.segmentation.yolact.design.YolactDesign`.
     """
 
-    def __init__(self, channels_in: Sequence[int], channels: int) -> None:
+    def __init__(self, channels_in: Sequence[int], channels: int, *, is_normalised: bool) -> None:
         super().__init__()
         # Both lists begin with the coarsest level, as in the authors' checkpoints.
         self.lat_layers = nn.ModuleList(nn.Conv2d(n, channels, 1) for n in reversed(channels_in))
-        self.pred_layers = nn.ModuleList(nn.Conv2d(channels, channels, 3, padding=1) for _ in channels_in)
+        self.pred_layers = nn.ModuleList(
+            convolution(channels, channels, is_normalised=is_normalised) for _ in channels_in
+        )
         self.downsample_layers = nn.ModuleList(nn.Conv2d(channels, channels, 3, 2, padding=1) for _ in range(2))
 
     def forward(self, features: Sequence[Tensor]) -> list[Tensor]:
