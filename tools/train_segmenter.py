@@ -63,10 +63,10 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--seed", type=int, default=0, help="of everything (0)")
     parser.add_argument("--scenes", type=int, default=360, help="random scenes that are rendered (360)")
     parser.add_argument("--frames-a-scene", type=int, default=FRAMES_A_SCENE, help=f"({FRAMES_A_SCENE})")
-    parser.add_argument("--steps", type=int, default=6500, help="of the optimiser (6500)")
+    parser.add_argument("--steps", type=int, default=3200, help="of the optimiser (3200)")
     parser.add_argument("--batch", type=int, default=16, help="images a step (16)")
     parser.add_argument("--rate", type=float, default=1e-3, help="largest learning rate (0.001)")
-    parser.add_argument("--threads", type=int, default=2, help="that render, and that PyTorch works with (2)")
+    parser.add_argument("--processes", type=int, default=2, help="that render and learn; threads of the test (2)")
     parser.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto", help="auto takes CUDA if present")
     parser.add_argument(
         "--precision",
@@ -77,9 +77,11 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--test", type=int, default=held_out.SCENARIOS, help="scenarios of the test (all)")
     parser.add_argument("--publish", action="store_true", help="put weights and card into assets/ at the end")
     args = parser.parse_args()
-    for name in ("scenes", "frames_a_scene", "steps", "batch", "threads", "test"):
+    for name in ("scenes", "frames_a_scene", "steps", "batch", "processes", "test"):
         if getattr(args, name) < 1:
             parser.error(f"--{name.replace('_', '-')} must be at least 1")
+    if args.batch < args.processes:
+        parser.error("--batch must be at least --processes: they share it")
     if args.test > held_out.SCENARIOS:
         parser.error(f"--test must be at most {held_out.SCENARIOS}")
     if args.publish and args.test < held_out.SCENARIOS:
@@ -98,14 +100,14 @@ def _run(args: argparse.Namespace) -> None:
         steps=args.steps,
         batch=args.batch,
         peak_rate=args.rate,
-        threads=args.threads,
+        processes=1 if device == "cuda" else args.processes,  # one keeps a GPU busy
         device=device,
         precision=args.precision,
     )
     out: Path = args.out
     out.mkdir(parents=True, exist_ok=True)
     store = FrameStore(out / f"frames-{args.seed}-{args.frames_a_scene}", args.seed, args.scenes, args.frames_a_scene)
-    rendering_s = _render(store, out, args.threads)
+    rendering_s = _render(store, out, args.processes)
     if not (out / SHEET).exists():
         write_sheet(store, settings, out / SHEET)
     with progress_bar("steps", remembered_s=120.0) as progress:
@@ -166,7 +168,7 @@ def _evaluations(out: Path, args: argparse.Namespace, facts: Facts) -> tuple[Seg
     folder.mkdir(exist_ok=True)
     for scenario in test:
         write_atomically(folder / f"{scenario.name}.json", scenario.to_json())
-    key = {"sha256": facts.sha256, "test": args.test, "threads": args.threads}
+    key = {"sha256": facts.sha256, "test": args.test, "threads": args.processes}
     if path.exists() and (told := json.loads(path.read_text(encoding="utf-8")))["key"] == key:
         first, second = (SegmenterEvaluation.model_validate(told[name]) for name in ("held_out", "catalog"))
         return first, second
@@ -183,7 +185,7 @@ def _judged(
     with progress_bar() as progress:
         task = progress.add_task(f"test, {name}", total=sum(len(frames_of(one, every)) for one in scenarios))
         return held_out.evaluate(
-            out / WEIGHTS, facts.settings.device, args.threads, scenarios, every, lambda: progress.advance(task)
+            out / WEIGHTS, facts.settings.device, args.processes, scenarios, every, lambda: progress.advance(task)
         )
 
 

@@ -28,7 +28,15 @@ from tools.segmenter_training.frames import FrameStore, LabelledFrame, labelled,
 from tools.segmenter_training.places import Places
 from tools.segmenter_training.scenes import HEIGHT, WIDTH, build_scene, draw_moment, draw_scenario
 from tools.segmenter_training.state import FILE, Settings
-from tools.segmenter_training.training import LOSSES, WEIGHTS, frames_of_step, learning_rate, normalised, train
+from tools.segmenter_training.team import Team, team
+from tools.segmenter_training.training import (
+    LOSSES,
+    WEIGHTS,
+    frames_of_step,
+    learning_rate,
+    normalised,
+    train,
+)
 from tools.train_vocabulary.rooms import random_room
 
 DESIGN = replace(
@@ -42,7 +50,7 @@ SETTINGS = Settings(
     steps=12,
     batch=2,
     peak_rate=2e-3,
-    threads=1,
+    processes=1,
     device="cpu",
     precision="float32",
 )
@@ -242,14 +250,14 @@ def test_the_loss_falls_and_a_killed_training_ends_with_the_same_weights(
     toys: list[LabelledFrame], tmp_path: Path
 ) -> None:
     whole, parts = tmp_path / "whole", tmp_path / "parts"
-    settings = replace(SETTINGS, steps=40, peak_rate=4e-3)
+    settings = replace(SETTINGS, steps=60)
     for folder in (whole, parts):
         folder.mkdir()
     train(toys, settings, whole, save_every=20, advance=no_advance, design=DESIGN)
     rows = [line.split(",") for line in (whole / LOSSES).read_text().splitlines()]
     assert rows[0] == ["step", "classes", "boxes", "masks", "semantic", "sum"]
-    assert [row[0] for row in rows[1:]] == ["20", "40"]
-    assert float(rows[2][-1]) < 0.8 * float(rows[1][-1])
+    assert [row[0] for row in rows[1:]] == ["20", "40", "60"]
+    assert float(rows[3][-1]) < 0.8 * float(rows[1][-1])
     # Killed between two states: what was learnt since the last one is learnt again.
     train(toys, settings, parts, save_every=20, advance=no_advance, design=DESIGN, stop_after=27)
     assert not (parts / WEIGHTS).exists()
@@ -260,6 +268,35 @@ def test_the_loss_falls_and_a_killed_training_ends_with_the_same_weights(
     train(toys, settings, parts, save_every=20, advance=no_advance, design=DESIGN)
     assert (parts / WEIGHTS).read_bytes() == before, "a finished training has nothing left to do"
     assert all(tensor.isfinite().all() for tensor in load_file(parts / WEIGHTS).values())
+
+
+def test_processes_share_a_training_and_go_on_where_they_were_killed(toys: list[LabelledFrame], tmp_path: Path) -> None:
+    whole, parts = tmp_path / "whole", tmp_path / "parts"
+    settings = replace(SETTINGS, processes=2, batch=4)
+    for folder in (whole, parts):
+        folder.mkdir()
+    train(toys, settings, whole, save_every=4, advance=no_advance, design=DESIGN)
+    train(toys, settings, parts, save_every=4, advance=no_advance, design=DESIGN, stop_after=6)
+    train(toys, settings, parts, save_every=4, advance=no_advance, design=DESIGN)
+    assert (parts / WEIGHTS).read_bytes() == (whole / WEIGHTS).read_bytes()
+
+
+def rank_everywhere(mine: Team) -> None:
+    mine.average([torch.full((2, 3), float(mine.rank)), torch.tensor(10.0 * mine.rank)])
+
+
+def fail(mine: Team) -> None:
+    raise TrainingError("no")
+
+
+def test_a_team_has_the_mean_and_ends_when_one_fails() -> None:
+    tensors = [torch.zeros(2, 3), torch.tensor(0.0)]
+    with team(3, 7, rank_everywhere) as mine:
+        mine.average(tensors)
+    assert tensors[0].tolist() == [[1.0] * 3] * 2
+    assert tensors[1].item() == 10.0
+    with pytest.raises(TrainingError, match="a process of the training has ended"), team(2, 7, fail) as mine:
+        mine.wait()
 
 
 def test_a_damaged_or_foreign_state_is_refused(toys: list[LabelledFrame], tmp_path: Path) -> None:

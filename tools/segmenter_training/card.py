@@ -54,7 +54,7 @@ def hardware(settings: Settings) -> str:
         for line in (cpuinfo.read_text(encoding="utf-8").splitlines() if cpuinfo.is_file() else [])
         if line.startswith("model name")
     ]
-    return f"{settings.threads} thread(s) of {names[0] if names else platform.machine()}, PyTorch {torch.__version__}"
+    return f"{settings.processes} core(s) of {names[0] if names else platform.machine()}, PyTorch {torch.__version__}"
 
 
 def card(facts: Facts, on_held_out: SegmenterEvaluation, on_catalog: SegmenterEvaluation) -> str:

@@ -102,6 +102,9 @@ class FrameStore:
         self._folder, self._seed, self._scenes = folder, seed, scenes
         self._scene = lru_cache(maxsize=None)(self._opened)
 
+    def __reduce__(self) -> tuple[type["FrameStore"], tuple[Path, int, int, int]]:
+        return FrameStore, (self._folder, self._seed, self._scenes, self.frames_a_scene)
+
     def __len__(self) -> int:
         return self._scenes * self.frames_a_scene
 

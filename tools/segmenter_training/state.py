@@ -27,7 +27,7 @@ class Settings:
         steps: of the optimiser.
         batch: images a step.
         peak_rate: largest learning rate.
-        threads: of PyTorch; sums depend on it in their last bits.
+        processes: that share each batch.
         device: "cpu" or "cuda".
         precision: "bfloat16" or "float32", of the convolutions; weights, loss and optimiser are float32.
     """
@@ -38,7 +38,7 @@ class Settings:
     steps: int
     batch: int
     peak_rate: float
-    threads: int
+    processes: int
     device: str
     precision: str
 
@@ -110,6 +110,10 @@ def restore_optimiser(optimiser: torch.optim.Optimizer, tensors: Mapping[str, Te
         number, _, name = key.partition(".")
         state.setdefault(int(number), {})[name] = value
     optimiser.load_state_dict({"state": state, "param_groups": optimiser.state_dict()["param_groups"]})
+    for parameter, named in optimiser.state.items():
+        for name, value in named.items():
+            if value.shape == parameter.shape:  # in memory as the parameter is: the last bits depend on it
+                named[name] = torch.empty_like(parameter).copy_(value)
 
 
 class AveragedWeights:

@@ -9,6 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Protocol
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 import torch
@@ -33,6 +34,7 @@ from tools.segmenter_training.state import (
     restore_optimiser,
     write_state,
 )
+from tools.segmenter_training.team import Team, team
 
 WEIGHTS, LOSSES = "compact.safetensors", "losses.csv"
 WARM_UP = 0.05
@@ -105,11 +107,34 @@ def train(
     Raises:
         TrainingError: the state is damaged or of other settings, or the loss is no number any more.
     """
-    torch.set_num_threads(settings.threads)
+    last = settings.steps if stop_after is None else min(stop_after, settings.steps)
+    values = sum(parameter.numel() for parameter in Yolact(design).parameters()) + len(Losses._fields)
+    with team(settings.processes, values, _help, frames, settings, folder, design, last) as mine:
+        return _learn(mine, frames, settings, folder, design, last, save_every, advance)
+
+
+def _help(mine: Team, frames: Frames, settings: Settings, folder: Path, design: YolactDesign, last: int) -> None:
+    """What the other processes do: the same steps, without a word."""
+    cv2.setNumThreads(1)
+    _learn(mine, frames, settings, folder, design, last, None, lambda steps, told: None)
+
+
+def _learn(
+    mine: Team,
+    frames: Frames,
+    settings: Settings,
+    folder: Path,
+    design: YolactDesign,
+    last: int,
+    save_every: int | None,
+    advance: Callable[[int, str], None],
+) -> float:
+    """The steps of one process; state, losses and weights are written only if it knows when to (`save_every`)."""
+    torch.set_num_threads(1)
     device = torch.device(settings.device)
     torch.manual_seed(settings.seed)
     network = Yolact(design).to(device).to(memory_format=torch.channels_last).train()  # type: ignore[call-overload]
-    optimiser = torch.optim.AdamW(_parameter_groups(network), lr=settings.peak_rate)
+    optimiser = torch.optim.AdamW(_parameter_groups(network), lr=settings.peak_rate, fused=True)
     averaged = AveragedWeights(network)
     anchors = anchors_of(design).to(device)
     first, earlier_s, rows = 0, 0.0, []
@@ -121,17 +146,20 @@ def train(
         restore_optimiser(optimiser, parts["optimiser"])
         rows = [row for row in _read_losses(folder / LOSSES) if int(row[0]) <= first]
         advance(first, "continued")
+    mine.wait()  # all have read before one writes
     start_s, recent = time.perf_counter(), []
-    last = settings.steps if stop_after is None else min(stop_after, settings.steps)
-    for step, (images, targets) in _batches(frames, settings, design, range(first, last)):
+    for step, (images, targets) in _batches(mine, frames, settings, design, range(first, last)):
         for group in optimiser.param_groups:
             group["lr"] = learning_rate(step, settings)
-        torch.manual_seed(int(child(settings.seed, "segmenter step", step).integers(2**31)))
-        losses = _step(network, optimiser, images.to(device), [_on(t, device) for t in targets], anchors, settings)
+        torch.manual_seed(int(child(settings.seed, "segmenter step", step, mine.rank).integers(2**31)))
+        seen = [_on(target, device) for target in targets]
+        losses = _step(mine, network, optimiser, images.to(device), seen, anchors, settings)
+        if not math.isfinite(sum(map(float, losses))):
+            raise TrainingError(f"step {step}: the loss is no number any more; begin anew with a smaller --rate")
+        if save_every is None:
+            continue
         averaged.see(network, step)
         recent.append([float(part) for part in losses])
-        if not math.isfinite(sum(recent[-1])):
-            raise TrainingError(f"step {step}: the loss is {sum(recent[-1])}; begin anew with a smaller --rate")
         done = step + 1
         if done % LOG_EVERY == 0 or done == last:
             means = [sum(column) / len(recent) for column in zip(*recent, strict=True)]
@@ -152,13 +180,14 @@ def train(
                     "optimiser": optimiser_tensors(optimiser),
                 },
             )
-    if last == settings.steps:
+    if last == settings.steps and save_every is not None:
         weights = {name: tensor.detach().cpu().contiguous() for name, tensor in averaged.tensors.items()}
         write_atomically(folder / WEIGHTS, save(weights))
     return earlier_s + time.perf_counter() - start_s if first < last else earlier_s
 
 
 def _step(
+    mine: Team,
     network: Yolact,
     optimiser: torch.optim.Optimizer,
     images: Tensor,
@@ -172,9 +201,11 @@ def _step(
     losses = yolact_loss(answer, targets, anchors)
     optimiser.zero_grad()
     torch.stack(tuple(losses)).sum().backward()  # type: ignore[no-untyped-call]
+    losses = Losses(*(part.detach() for part in losses))
+    mine.average([*(p.grad for p in network.parameters() if p.grad is not None), *losses])
     torch.nn.utils.clip_grad_norm_(network.parameters(), LARGEST_GRADIENT)
     optimiser.step()
-    return Losses(*(part.detach() for part in losses))
+    return losses
 
 
 def _parameter_groups(network: Yolact) -> list[dict[str, object]]:
@@ -185,22 +216,25 @@ def _parameter_groups(network: Yolact) -> list[dict[str, object]]:
 
 
 def _batches(
-    frames: Frames, settings: Settings, design: YolactDesign, steps: range
+    mine: Team, frames: Frames, settings: Settings, design: YolactDesign, steps: range
 ) -> Iterator[tuple[int, tuple[Tensor, list[Target]]]]:
     """The batches of the steps; the next one is made while the network learns from this one."""
     with ThreadPoolExecutor(1) as pool:
-        waiting = pool.submit(_batch, frames, settings, design, steps[0]) if len(steps) else None
+        waiting = pool.submit(_batch, mine, frames, settings, design, steps[0]) if len(steps) else None
         for step in steps:
             assert waiting is not None
             batch = waiting.result()
-            waiting = pool.submit(_batch, frames, settings, design, step + 1) if step + 1 in steps else None
+            waiting = pool.submit(_batch, mine, frames, settings, design, step + 1) if step + 1 in steps else None
             yield step, batch
 
 
-def _batch(frames: Frames, settings: Settings, design: YolactDesign, step: int) -> tuple[Tensor, list[Target]]:
-    """Images (B, 3, H, W), normalised, and what is to be found in them."""
+def _batch(
+    mine: Team, frames: Frames, settings: Settings, design: YolactDesign, step: int
+) -> tuple[Tensor, list[Target]]:
+    """Images (B, 3, H, W) of this process's share of a step, normalised, and what is to be found in them."""
     images, targets = [], []
-    for place, index in enumerate(frames_of_step(step, len(frames), settings)):
+    places = list(enumerate(frames_of_step(step, len(frames), settings)))
+    for place, index in places[mine.rank :: len(mine)]:
         rng = child(settings.seed, "segmenter change", step * settings.batch + place)
         frame = changed(frames[index], draw_change(rng, design.height, design.width), rng)
         images.append(frame.rgb)
