@@ -88,13 +88,9 @@ def test_the_loss_by_slow_sums() -> None:
     box, classes = match(anchors, target)
     probabilities = torch.softmax(answer.logits[0], dim=1)
     positives = [i for i, c in enumerate(classes.tolist()) if c > 0]
-    negatives = sorted(
-        (-math.log(probabilities[i, 0].item()) for i, c in enumerate(classes.tolist()) if c == 0), reverse=True
-    )
-    assert len(negatives) > 3 * len(positives) > 3
-    of_classes = sum(-math.log(probabilities[i, classes[i]].item()) for i in positives) + sum(
-        negatives[: 3 * len(positives)]
-    )
+    likelihoods = [probabilities[i, c].item() for i, c in enumerate(classes.tolist()) if c != IGNORED]
+    assert len(anchors) > len(likelihoods) > 3 * len(positives) > 3
+    of_classes = sum(-((1 - likelihood) ** 2) * math.log(likelihood) for likelihood in likelihoods)
     of_boxes = of_masks = 0.0
     small = masks[:, ::2, ::2] + masks[:, 1::2, ::2] + masks[:, ::2, 1::2] + masks[:, 1::2, 1::2] > 2
     for i in positives:
@@ -120,11 +116,15 @@ def test_the_loss_by_slow_sums() -> None:
     )
 
 
-def test_an_image_without_objects_costs_what_its_semantic_answer_costs() -> None:
+def test_an_image_without_objects_costs_what_is_found_in_it() -> None:
     anchors = anchors_of(replace(COMPACT, height=48, width=64))
-    told = yolact_loss(answer_of(anchors, 2), [NOTHING], anchors)
-    assert (told.classes.item(), told.boxes.item(), told.masks.item()) == (0.0, 0.0, 0.0)
+    answer = answer_of(anchors, 2)
+    told = yolact_loss(answer, [NOTHING], anchors)
+    assert (told.boxes.item(), told.masks.item()) == (0.0, 0.0)
     assert told.semantic.item() > 0
+    background = torch.softmax(answer.logits[0], dim=1)[:, 0].tolist()
+    of_classes = sum(-((1 - likelihood) ** 2) * math.log(likelihood) for likelihood in background)
+    assert told.classes.item() == pytest.approx(of_classes, rel=1e-4)
 
 
 def test_a_small_network_learns_one_picture_by_heart() -> None:

@@ -258,4 +258,4 @@ def test_training_gives_a_semantic_answer_too() -> None:
     answer = network(torch.zeros(2, 3, 240, 320))
     assert answer.semantic.shape == (2, 4, 30, 40)
     assert answer.prototypes.shape == (2, 60, 80, 24)
-    assert answer.offsets.shape == (2, 4818, 4)
+    assert answer.offsets.shape == (2, 9636, 4)

@@ -38,7 +38,7 @@ def slow_anchors(design: YolactDesign, sizes: tuple[tuple[int, int], ...], squar
     [
         (YOLACT, SIZES["yolact"], True, 19248),
         (YOLACT_PLUS, SIZES["yolact"], False, 57744),
-        (COMPACT, SIZES["compact"], False, 4818),
+        (COMPACT, SIZES["compact"], False, 9636),
     ],
     ids=["yolact", "yolact++", "compact"],
 )

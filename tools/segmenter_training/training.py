@@ -39,6 +39,8 @@ from tools.segmenter_training.team import Team, team
 WEIGHTS, LOSSES = "compact.safetensors", "losses.csv"
 WARM_UP = 0.05
 """Share of the steps in which the learning rate grows."""
+FIRST_FOUND = 0.02
+"""At the beginning an anchor stands for something with this probability: else those without a box drown the others."""
 LAST_RATE = 0.01
 """The learning rate at the end, as a share of the largest."""
 WEIGHT_DECAY = 0.02
@@ -134,6 +136,7 @@ def _learn(
     device = torch.device(settings.device)
     torch.manual_seed(settings.seed)
     network = Yolact(design).to(device).to(memory_format=torch.channels_last).train()  # type: ignore[call-overload]
+    _expect_background(network)
     optimiser = torch.optim.AdamW(_parameter_groups(network), lr=settings.peak_rate, fused=True)
     averaged = AveragedWeights(network)
     anchors = anchors_of(design).to(device)
@@ -206,6 +209,15 @@ def _step(
     torch.nn.utils.clip_grad_norm_(network.parameters(), LARGEST_GRADIENT)
     optimiser.step()
     return losses
+
+
+def _expect_background(network: Yolact) -> None:
+    """Set the biases of the classes so that the network finds nearly nothing at first (Lin et al., section 4.1)."""
+    layer = network.prediction_layers[0].conf_layer
+    classes = network.semantic_seg_conv.out_channels
+    with torch.no_grad():
+        layer.bias.view(-1, classes + 1)[:] = 0.0
+        layer.bias.view(-1, classes + 1)[:, 0] = math.log(classes * (1 - FIRST_FOUND) / FIRST_FOUND)
 
 
 def _parameter_groups(network: Yolact) -> list[dict[str, object]]:

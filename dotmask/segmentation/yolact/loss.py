@@ -1,4 +1,9 @@
-"""The loss that the networks learn by (YOLACT, section "Losses"; boxes and classes as in SSD)."""
+"""The loss that the networks learn by (YOLACT, section "Losses"), with the classes' part of RetinaNet.
+
+YOLACT teaches classes by the anchors that are most wrong, three without a box for one with, as SSD does. A network that
+begins with random weights learns faster from all of them, each weighted by how wrong it is: the focal loss (Lin et al.,
+ICCV 2017).
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,8 +22,8 @@ CLASS_WEIGHT, BOX_WEIGHT, MASK_WEIGHT, SEMANTIC_WEIGHT = 1.0, 1.5, 6.125, 1.0
 POSITIVE_IOU, NEGATIVE_IOU = 0.5, 0.4
 """An anchor stands for a box with a larger IoU than the first, and for none if its IoU with all is below the second."""
 
-NEGATIVES_A_POSITIVE = 3
-"""So many anchors without a box count for each with one: those that are most wrong (online hard example mining)."""
+FOCUS = 2.0
+"""Exponent of the focal loss: the larger, the less counts an anchor that is right already."""
 
 MOST_MASKS = 100
 """So many masks of an image count at most, chosen at random."""
@@ -118,14 +123,10 @@ def yolact_loss(answer: Answer, targets: Sequence[Target], anchors: Tensor) -> L
 
 
 def _class_loss(logits: Tensor, told: Tensor) -> Tensor:
-    """Sum of the cross entropy over the positives and the hardest negatives of one image."""
-    is_positive, is_negative = told > 0, told == 0
-    # How wrong a negative is: minus the logarithm of the probability of background.
-    wrong = torch.logsumexp(logits, dim=1) - logits[:, 0]
-    count = min(NEGATIVES_A_POSITIVE * int(is_positive.sum()), int(is_negative.sum()))
-    hardest = wrong.detach().masked_fill(~is_negative, -1.0).topk(count).indices
-    positive = functional.cross_entropy(logits[is_positive], told[is_positive], reduction="sum")
-    return positive + wrong[hardest].sum()
+    """Sum of the focal loss over all anchors that stand for a box or for none."""
+    is_used = told != IGNORED
+    likelihoods = torch.log_softmax(logits[is_used], dim=1).gather(1, told[is_used, None])
+    return (-((1 - likelihoods.exp()) ** FOCUS) * likelihoods).sum()
 
 
 def _mask_loss(prototypes: Tensor, coefficients: Tensor, target: Target, box: Tensor) -> Tensor:
