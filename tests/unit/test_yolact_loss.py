@@ -41,9 +41,9 @@ def test_matching_by_hand() -> None:
     anchors = torch.tensor(
         [
             anchor(0.0, 0.0, 0.4, 0.4),  # IoU 1 with the first
-            anchor(0.0, 0.0, 0.4, 0.22),  # 0.55
             anchor(0.0, 0.0, 0.4, 0.18),  # 0.45
-            anchor(0.0, 0.0, 0.4, 0.12),  # 0.3
+            anchor(0.0, 0.0, 0.4, 0.14),  # 0.35
+            anchor(0.0, 0.0, 0.4, 0.08),  # 0.2
             anchor(0.5, 0.5, 0.7, 0.7),  # 0.01 / 0.19 with the second, and nobody has more
         ]
     )
