@@ -22,7 +22,7 @@ CLASS_WEIGHT, BOX_WEIGHT, MASK_WEIGHT, SEMANTIC_WEIGHT = 1.0, 1.5, 6.125, 1.0
 POSITIVE_IOU, NEGATIVE_IOU = 0.4, 0.3
 """An anchor stands for a box with a larger IoU than the first, and for none if its IoU with all is below the second.
 
-YOLACT has 0.5 and 0.4; so more anchors learn from every object.
+YOLACT has 0.5 and 0.4; with less, more anchors learn from every object.
 """
 
 FOCUS = 2.0
