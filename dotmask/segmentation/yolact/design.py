@@ -24,8 +24,8 @@ class YolactDesign:
             published YOLACT was trained with, and YOLACT++ was not.
         rescores_masks: whether a score is multiplied with the IoU that a small network expects of the mask (YOLACT++).
         is_normalised: whether the convolutions behind the backbone are followed by group normalisation (Wu and He, ECCV
-            2018). The published networks begin with a trained backbone and need none; with random weights, half of what
-            follows the backbone would fall silent.
+            2018). The published networks begin with a trained backbone and need none; in one that began with random
+            weights, a quarter to two thirds of the channels of each of these layers fell silent.
         least_mask_px: masks with fewer pixels of the image are left out.
     """
 
