@@ -12,13 +12,13 @@ from pathlib import Path
 
 from rich.progress import track
 
-from scenarios.registry import scenario
 from scenarios.report import MapReport
 from scenarios.run import RunSettings
 from scenarios.spec import with_overrides
 from scenarios.sweep.cells import Cell, Done, run_and_keep
 from scenarios.sweep.executors import cores, run_local
 from tools.doc_block import figure, markdown_table, write_block
+from tools.finished_cells import first_frames
 
 PAGE = Path(__file__).parent.parent / "docs" / "mapping.md"
 PICTURE = PAGE.with_name("map.png")
@@ -38,12 +38,11 @@ HEADER = [
 
 def cell(name: str, frames: int | None, variant: str, methods: str) -> Cell:
     """A run with maps; `varied` says which."""
-    chosen = scenario(name)
-    if frames is not None:
-        chosen = with_overrides(chosen, {"frames": str(min(frames, chosen.frames))})
     settings = RunSettings.parse(methods=methods, with_map=True, threads=1)
     varied = {"scenario": name, "variant": variant}
-    return Cell(scenario=with_overrides(chosen, {"variant": variant}), settings=settings, varied=varied)
+    return Cell(
+        scenario=with_overrides(first_frames(name, frames), {"variant": variant}), settings=settings, varied=varied
+    )
 
 
 def maps(done: Done) -> dict[str, MapReport]:

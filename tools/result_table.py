@@ -11,13 +11,12 @@ What is finished is kept in runs/results: after an interruption the same command
 import argparse
 from pathlib import Path
 
-from scenarios.registry import SCENARIOS, scenario
+from scenarios.registry import SCENARIOS
 from scenarios.report import Report
 from scenarios.run import RunSettings
-from scenarios.spec import with_overrides
 from scenarios.sweep.cells import Cell
 from tools.doc_block import figure, markdown_table, write_block
-from tools.finished_cells import reports
+from tools.finished_cells import first_frames, reports
 
 PAGE = Path(__file__).parent.parent / "README.md"
 HEADER = [
@@ -59,12 +58,7 @@ def main() -> None:
     options = parser.parse_args()
     names = options.names or [s.name for s in SCENARIOS.values() if "walking" in s.tags]
     settings = RunSettings.parse(methods="unmasked,dotmask", threads=1)
-    cells = []
-    for name in names:
-        chosen = scenario(name)
-        if options.frames is not None:
-            chosen = with_overrides(chosen, {"frames": str(min(options.frames, chosen.frames))})
-        cells.append(Cell(scenario=chosen, settings=settings, varied={}))
+    cells = [Cell(scenario=first_frames(name, options.frames), settings=settings, varied={}) for name in names]
     rows = [row(report) for report in reports(cells, Path("runs") / "results")]
     table = markdown_table(HEADER, rows)
     print(table)

@@ -12,13 +12,11 @@ What is finished is kept in runs/segmenter_table: after an interruption the same
 import argparse
 from pathlib import Path
 
-from scenarios.registry import scenario
 from scenarios.report import Report
 from scenarios.run import RunSettings
-from scenarios.spec import with_overrides
 from scenarios.sweep.cells import Cell
 from tools.doc_block import figure, markdown_table, write_block
-from tools.finished_cells import reports
+from tools.finished_cells import first_frames, reports
 
 PAGE = Path(__file__).parent.parent / "docs" / "segmenters.md"
 NAMES = ("fr3_walking_static", "fr3_walking_xyz", "fr3_walking_rpy", "fr3_walking_halfsphere", "tilted")
@@ -73,12 +71,10 @@ def main() -> None:
     settings = RunSettings.parse(
         methods="unmasked,dotmask-oracle,dotmask", segmenter="compact", weights=options.weights, threads=1
     )
-    cells = []
-    for name in options.names or NAMES:
-        chosen = scenario(name)
-        if options.frames is not None:
-            chosen = with_overrides(chosen, {"frames": str(min(options.frames, chosen.frames))})
-        cells.append(Cell(scenario=chosen, settings=settings, varied={}))
+    cells = [
+        Cell(scenario=first_frames(name, options.frames), settings=settings, varied={})
+        for name in options.names or NAMES
+    ]
     table = markdown_table(HEADER, [row(report) for report in reports(cells, Path("runs") / "segmenter_table")])
     print(table)
     if options.write:
