@@ -29,14 +29,7 @@ from tools.segmenter_training.places import Places
 from tools.segmenter_training.scenes import HEIGHT, WIDTH, build_scene, draw_moment, draw_scenario
 from tools.segmenter_training.state import FILE, Settings
 from tools.segmenter_training.team import Team, team
-from tools.segmenter_training.training import (
-    LOSSES,
-    WEIGHTS,
-    frames_of_step,
-    learning_rate,
-    normalised,
-    train,
-)
+from tools.segmenter_training.training import LOSSES, WEIGHTS, frames_of_step, learning_rate, normalised, train
 from tools.train_vocabulary.rooms import random_room
 
 DESIGN = replace(

@@ -7,7 +7,7 @@ nearly twice as fast as one process with two threads.
 import os
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing import parent_process
 from multiprocessing.synchronize import Barrier
@@ -96,13 +96,12 @@ def team(count: int, values: int, help_out: Callable[..., None], *args: Any) -> 
 
 def _helping(mine: Team, help_out: Callable[..., None], args: tuple[Any, ...]) -> None:
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    try:
-        help_out(mine, *args)
-    except (KeyboardInterrupt, TrainingError):  # the first process says so
-        mine.barrier.abort()
-    except BaseException:
-        mine.barrier.abort()
-        raise
+    with suppress(KeyboardInterrupt, TrainingError):  # the first process says so
+        try:
+            help_out(mine, *args)
+        except BaseException:
+            mine.barrier.abort()
+            raise
 
 
 def _end_with_parent() -> None:

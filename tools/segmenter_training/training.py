@@ -157,18 +157,19 @@ def _learn(
         torch.manual_seed(int(child(settings.seed, "segmenter step", step, mine.rank).integers(2**31)))
         seen = [_on(target, device) for target in targets]
         losses = _step(mine, network, optimiser, images.to(device), seen, anchors, settings)
-        if not math.isfinite(sum(map(float, losses))):
+        told = [float(part) for part in losses]
+        if not math.isfinite(sum(told)):
             raise TrainingError(f"step {step}: the loss is no number any more; begin anew with a smaller --rate")
         if save_every is None:
             continue
         averaged.see(network, step)
-        recent.append([float(part) for part in losses])
+        recent.append(told)
         done = step + 1
         if done % LOG_EVERY == 0 or done == last:
             means = [sum(column) / len(recent) for column in zip(*recent, strict=True)]
             rows.append([str(done), *(f"{mean:.5f}" for mean in (*means, sum(means)))])
             recent = []
-        advance(1, f"loss {sum(map(float, losses)):.2f}")
+        advance(1, f"loss {sum(told):.2f}")
         if done % save_every == 0 or done == settings.steps:
             seconds = earlier_s + time.perf_counter() - start_s
             _write_losses(folder / LOSSES, rows)
@@ -221,7 +222,7 @@ def _expect_background(network: Yolact) -> None:
 
 
 def _parameter_groups(network: Yolact) -> list[dict[str, object]]:
-    """Weights of convolutions decay; biases and batch norms do not."""
+    """Weights of convolutions decay; biases and norms do not."""
     heavy = [p for p in network.parameters() if p.ndim > 1]
     light = [p for p in network.parameters() if p.ndim <= 1]
     return [{"params": heavy, "weight_decay": WEIGHT_DECAY}, {"params": light, "weight_decay": 0.0}]
