@@ -12,6 +12,7 @@ from torch.nn import functional
 from dotmask.records import Intrinsics, RgbdFrame
 from dotmask.segmentation.coco import COCO_CLASSES
 from dotmask.segmentation.yolact.design import COMPACT, YOLACT, YOLACT_PLUS, YolactDesign
+from dotmask.segmentation.yolact.heads import FinePrototypes
 from dotmask.segmentation.yolact.network import Yolact
 from dotmask.segmentation.yolact.segmenter import YolactSegmenter
 
@@ -157,6 +158,39 @@ def test_the_network_is_what_the_papers_draw(design: YolactDesign) -> None:
             torch.testing.assert_close(network.maskiou_net(masks), written.mask_ious(masks), **close)
 
 
+def test_fine_prototypes_are_made_as_drawn() -> None:
+    """P3 -> three blocks -> twice as large, with C2 -> one block -> twice as large, with C1 -> prototypes."""
+    net, generator = FinePrototypes((5, 7), 16, 3, is_normalised=True), torch.Generator().manual_seed(2)
+    tensors = net.state_dict()
+    p3, half, quarter = (
+        torch.randn(1, n, h, w, generator=generator) for n, h, w in ((16, 3, 4), (5, 12, 16), (7, 6, 8))
+    )
+
+    def block(x: Tensor, name: str) -> Tensor:
+        x = functional.conv2d(x, tensors[f"{name}.0.weight"], tensors[f"{name}.0.bias"], padding=1)
+        groups = x.reshape(1, 2, -1)  # 8 channels each
+        deviations = groups - groups.mean(dim=2, keepdim=True)
+        x = (deviations / (deviations.square().mean(dim=2, keepdim=True) + 1e-5).sqrt()).reshape(x.shape)
+        return (x * tensors[f"{name}.1.weight"][:, None, None] + tensors[f"{name}.1.bias"][:, None, None]).relu()
+
+    def merged(x: Tensor, fine: Tensor, name: str) -> Tensor:
+        lateral = torch.einsum("bchw,kc->bkhw", fine, tensors[f"{name}.weight"][:, :, 0, 0])
+        lateral += tensors[f"{name}.bias"][:, None, None]
+        return (functional.interpolate(x, scale_factor=2, mode="bilinear") + lateral).relu()
+
+    x = block(block(block(p3, "coarse.0"), "coarse.2"), "coarse.4")
+    x = block(merged(x, quarter, "quarter_lateral"), "at_quarter.0")
+    x = merged(x, half, "half_lateral")
+    expected = functional.conv2d(x, tensors["at_half.weight"], tensors["at_half.bias"], padding=1)
+    torch.testing.assert_close(net(p3, half, quarter), expected, atol=1e-5, rtol=1e-5)
+
+
+def last_of_prototypes(network: Yolact) -> torch.nn.Conv2d:
+    """The convolution that the prototypes come from."""
+    net = network.proto_net
+    return net.at_half if isinstance(net, FinePrototypes) else net[10]
+
+
 def detecting(design: YolactDesign, class_name: str) -> Yolact:
     """A network that takes the first anchor of every cell for a class with probability 0.9; its masks have pixels."""
     network = make(design)
@@ -170,7 +204,7 @@ def detecting(design: YolactDesign, class_name: str) -> Yolact:
     for anchor in range(1, design.anchors_a_cell):
         layer.bias.data[anchor * numbers] = 20.0
     network.prediction_layers[0].mask_layer.bias.data += 0.5
-    network.proto_net[10].bias.data += 0.1
+    last_of_prototypes(network).bias.data += 0.1
     return network
 
 
@@ -201,17 +235,17 @@ def test_a_box_is_told_by_the_centres_of_its_outermost_pixels() -> None:
     design = replace(COMPACT, scales_px=((18.0,), (32.0,), (64.0,), (128.0,), (80.0,)), aspect_ratios=(1.0,))
     network = detecting(design, "cup")
     head = network.prediction_layers[0]
-    for values in (*head.bbox_layer.parameters(), head.mask_layer.weight, network.proto_net[10].weight):
+    for values in (*head.bbox_layer.parameters(), head.mask_layer.weight, last_of_prototypes(network).weight):
         torch.nn.init.zeros_(values)
     torch.nn.init.constant_(head.mask_layer.bias, 9.0)
-    torch.nn.init.ones_(network.proto_net[10].bias)  # every mask fills its box, and a margin
+    torch.nn.init.ones_(last_of_prototypes(network).bias)  # every mask fills its box, and a margin
     found = YolactSegmenter(network, design, CPU).segment(frame(320, 240))
     # P3 has a square of 18 px every 8 px, the first around 4, 4; of equal scores the first ones are kept.
     np.testing.assert_allclose(found.boxes_px[:2], [[0, 0, 12, 12], [3, 0, 20, 12]], atol=1e-4)
     box = next(index for index, box in enumerate(found.boxes_px) if np.allclose(box, [11, 11, 28, 28], atol=1e-4))
     rows, columns = np.nonzero(found.masks[box])
-    # 11..29 is 2.75..7.25 of the prototypes, and with the margin 1.75..8.25: the pixels 2 to 8 of them.
-    assert (rows.min(), rows.max(), columns.min(), columns.max()) == (8, 35, 8, 35)
+    # 11..29 is 5.5..14.5 of the prototypes, and with the margin 4.5..15.5: the pixels 5 to 15 of them.
+    assert (rows.min(), rows.max(), columns.min(), columns.max()) == (10, 31, 10, 31)
 
 
 def test_scores_of_yolact_plus_are_multiplied_with_the_expected_iou() -> None:
@@ -257,5 +291,5 @@ def test_training_gives_a_semantic_answer_too() -> None:
     network = make(COMPACT).train()
     answer = network(torch.zeros(2, 3, 240, 320))
     assert answer.semantic.shape == (2, 4, 30, 40)
-    assert answer.prototypes.shape == (2, 60, 80, 24)
+    assert answer.prototypes.shape == (2, 120, 160, 24)
     assert answer.offsets.shape == (2, 9636, 4)

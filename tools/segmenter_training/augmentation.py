@@ -15,8 +15,8 @@ from tools.segmenter_training.frames import LabelledFrame
 
 LEAST_PX = 20
 """An instance with fewer pixels of the network's image is nothing to be found: the judge begins at 80 of 640x480."""
-MASK_SHARE = 4
-"""Masks have a quarter of the image's height and width: as many pixels as the prototypes."""
+MASK_SHARE = 2
+"""Masks have half of the image's height and width: as many pixels as the prototypes."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -35,10 +35,10 @@ class BasicBlock(nn.Module):
 
 
 class CompactBackbone(nn.Module):
-    """Features at an eighth, a sixteenth and a thirty-second of the size."""
+    """Features at a half, a quarter, an eighth, a sixteenth and a thirty-second of the size."""
 
-    CHANNELS = (STAGES[1][0], STAGES[2][0], STAGES[3][0])
-    """Of C3, C4 and C5."""
+    CHANNELS = (STEM, *(channels for channels, _ in STAGES))
+    """Of C1 to C5."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -53,11 +53,9 @@ class CompactBackbone(nn.Module):
             self.stages.append(nn.Sequential(*made))
             channels_in = channels
 
-    def forward(self, x: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """C3, C4 and C5."""
-        x = self.stem(x)
-        features = []
+    def forward(self, x: Tensor) -> list[Tensor]:
+        """C1 to C5."""
+        features = [self.stem(x)]
         for stage in self.stages:
-            x = stage(x)
-            features.append(x)
-        return features[1], features[2], features[3]
+            features.append(stage(features[-1]))
+        return features

@@ -8,7 +8,7 @@ from torch import Tensor, nn
 
 from dotmask.segmentation.yolact.compact import CompactBackbone
 from dotmask.segmentation.yolact.design import YolactDesign
-from dotmask.segmentation.yolact.heads import MaskIouNet, PredictionHead, prototype_network
+from dotmask.segmentation.yolact.heads import FinePrototypes, MaskIouNet, PredictionHead, prototype_network
 from dotmask.segmentation.yolact.pyramid import FeaturePyramid
 from dotmask.segmentation.yolact.resnet import ResNet50
 
@@ -50,9 +50,14 @@ class Yolact(nn.Module):
             if design.backbone == "compact"
             else ResNet50(is_deformable=design.backbone == "resnet50_deformable")
         )
-        self.proto_net = prototype_network(design.channels, design.prototypes, is_normalised=design.is_normalised)
+        *finer, c3, c4, c5 = self.backbone.CHANNELS
+        self.proto_net: nn.Module = (
+            FinePrototypes(finer, design.channels, design.prototypes, is_normalised=design.is_normalised)
+            if finer
+            else prototype_network(design.channels, design.prototypes)
+        )
         self.maskiou_net: MaskIouNet | None = MaskIouNet(classes) if design.rescores_masks else None
-        self.fpn = FeaturePyramid(self.backbone.CHANNELS, design.channels, is_normalised=design.is_normalised)
+        self.fpn = FeaturePyramid((c3, c4, c5), design.channels, is_normalised=design.is_normalised)
         head = PredictionHead(
             design.channels,
             design.anchors_a_cell,
@@ -65,10 +70,11 @@ class Yolact(nn.Module):
 
     def forward(self, images: Tensor) -> Answer:
         """The answer about images (B, 3, height, width), normalised as `dotmask.segmentation.yolact.images` does."""
-        levels = self.fpn(self.backbone(images))
+        *finer, c3, c4, c5 = self.backbone(images)
+        levels = self.fpn((c3, c4, c5))
         head = self.prediction_layers[0]
         offsets, logits, coefficients = (torch.cat(parts, dim=1) for parts in zip(*map(head, levels), strict=True))
-        prototypes = torch.relu(self.proto_net(levels[0])).permute(0, 2, 3, 1)
+        prototypes = torch.relu(self.proto_net(levels[0], *finer)).permute(0, 2, 3, 1)
         semantic = self.semantic_seg_conv(levels[0]) if self.training else None
         return Answer(offsets, logits, coefficients, prototypes, semantic)
 

@@ -77,11 +77,11 @@ class ResNet50(nn.Module):
         self.relu = nn.ReLU(inplace=True)
         self.maxpool = nn.MaxPool2d(3, 2, padding=1)
 
-    def forward(self, x: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    def forward(self, x: Tensor) -> list[Tensor]:
         """C3, C4 and C5, at an eighth, a sixteenth and a thirty-second of the size."""
         x = self.maxpool(self.relu(self.bn1(self.conv1(x))))
         features = []
         for layer in self.layers:
             x = layer(x)
             features.append(x)
-        return features[1], features[2], features[3]
+        return features[1:]
