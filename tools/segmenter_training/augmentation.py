@@ -58,7 +58,7 @@ def draw_change(rng: np.random.Generator, height: int, width: int) -> Change:
     """A random change of an image of this size."""
     zoom, turn, shift = 1.0, 0.0, (0.0, 0.0)
     if rng.random() < 0.6:
-        zoom = math.exp(rng.uniform(math.log(0.8), math.log(1.7)))
+        zoom = math.exp(rng.uniform(math.log(0.5), math.log(1.7)))
         turn = float(rng.normal(0.0, math.radians(5.0)))
         reach = 0.05 + max(zoom - 1.0, 0.0) / 2  # the image stays about full
         shift = (float(rng.uniform(-reach, reach)) * width, float(rng.uniform(-reach, reach)) * height)
