@@ -64,7 +64,7 @@ class SegmenterEvaluation(Part):
         profile: whose threshold and number decide `iou` and the misses.
         scenarios: the frames that were looked at, by scenario.
         classes: figures by class.
-        misses: by circumstance: `distance_m`, `tilt_deg`, `truncated`, `blur_px`.
+        misses: by circumstance: `visible_px`, `distance_m`, `tilt_deg`, `truncated`, `blur_px`.
         ms: see Milliseconds.
     """
 
@@ -82,6 +82,7 @@ class SegmenterEvaluation(Part):
 
 
 CIRCUMSTANCES = {
+    "visible_px": "visible pixels",
     "distance_m": "distance, m",
     "tilt_deg": "tilt of the camera, deg",
     "truncated": "cut by the image's border",

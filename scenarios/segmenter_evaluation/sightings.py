@@ -24,6 +24,7 @@ class Sighting:
     Attributes:
         class_name: of the instance.
         iou: with the detection of its class that it was matched to; None where it was missed.
+        visible_px: how many pixels of it are seen.
         distance_m: from the camera to its centre.
         tilt_deg: by how much the camera is rolled.
         is_truncated: whether it touches the image's border.
@@ -32,6 +33,7 @@ class Sighting:
 
     class_name: str
     iou: float | None
+    visible_px: int
     distance_m: float
     tilt_deg: float
     is_truncated: bool
@@ -62,6 +64,7 @@ def sightings_of(
             Sighting(
                 class_name=actor.class_name,
                 iou=iou if class_name == actor.class_name else None,
+                visible_px=actor.visible_pixels,
                 distance_m=float(np.linalg.norm(actor.centre_world - truth.T_world_camera[:3, 3])),
                 tilt_deg=roll_deg(truth.T_world_camera),
                 is_truncated=actor.is_truncated,
@@ -92,8 +95,8 @@ def _blur_px(actor: ObjectTruth, frame: SimFrame, simulator: Simulator) -> float
     return float(np.linalg.norm(ends[1] - ends[0]))
 
 
-DISTANCES_M, TILTS_DEG, BLURS_PX = (0, 1, 2, 3, 4, 6), (0, 10, 30, 60, 90), (0, 1, 3, 8)
-"""Lower ends of the bands; the last one is open."""
+SIZES_PX, DISTANCES_M, TILTS_DEG, BLURS_PX = (0, 32**2, 96**2), (0, 1, 2, 3, 4, 6), (0, 10, 30, 60, 90), (0, 1, 3, 8)
+"""Lower ends of the bands; the last one is open. The sizes are COCO's small, medium and large."""
 
 
 def misses(sightings: Sequence[Sighting]) -> dict[str, tuple[Band, ...]]:
@@ -111,6 +114,7 @@ def misses(sightings: Sequence[Sighting]) -> dict[str, tuple[Band, ...]]:
         for name, is_cut in (("no", False), ("yes", True))
     ]
     return {
+        "visible_px": bands(SIZES_PX, lambda s: s.visible_px),
         "distance_m": bands(DISTANCES_M, lambda s: s.distance_m),
         "tilt_deg": bands(TILTS_DEG, lambda s: s.tilt_deg),
         "truncated": tuple(one for one in cut if one.seen),

@@ -130,6 +130,7 @@ def test_circumstances_in_numbers() -> None:
     (one,) = look(seen(5, roll_deg=25.0), found)
     assert one.iou == pytest.approx(18 / 22)
     assert (one.class_name, one.is_truncated) == ("person", True)
+    assert one.visible_px == seen(5).truth.objects[0].visible_pixels
     assert one.distance_m == pytest.approx(2.0)
     assert one.tilt_deg == pytest.approx(25.0)
     assert one.blur_px == pytest.approx(500 * 0.02 / 2), "f v t / z"
@@ -150,21 +151,25 @@ def test_what_counts_as_missed() -> None:
 
 
 def test_bands_add_up() -> None:
-    def sighting(distance_m: float, *, found: bool) -> Sighting:
+    def sighting(distance_m: float, *, found: bool, visible_px: int = 5000) -> Sighting:
         return Sighting(
             class_name="cup",
             iou=0.8 if found else None,
+            visible_px=visible_px,
             distance_m=distance_m,
             tilt_deg=0.0,
             is_truncated=False,
             blur_px=9.0,
         )
 
-    told = misses([sighting(1.0, found=True), sighting(1.99, found=False), sighting(50.0, found=False)])
+    told = misses(
+        [sighting(1.0, found=True), sighting(1.99, found=False), sighting(50.0, found=False, visible_px=1023)]
+    )
     assert told["distance_m"] == (
         Band(label="1 to 2", seen=2, missed=1, missed_share=0.5),
         Band(label="6 and more", seen=1, missed=1, missed_share=1.0),
     )
+    assert [(band.label, band.missed) for band in told["visible_px"]] == [("0 to 1024", 1), ("1024 to 9216", 1)]
     assert [band.label for band in told["blur_px"]] == ["8 and more"]
     assert told["truncated"] == (Band(label="no", seen=3, missed=2, missed_share=2 / 3),)
 

@@ -117,7 +117,7 @@ a quarter with motion blur and rolling shutter. An instance is to be found if it
 ## Limits
 
 It knows the people, chairs, cups and bottles of this simulator alone. Masks have {mask_px} pixels: the rims of
-small things are coarse. How often it misses what is far, rolled, cut or blurred is said above.
+small things are coarse. How often it misses what is small, far, rolled, cut or blurred is said above.
 """
 
 
