@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from sim.geometry import FloatArray
 from sim.scene import SceneObject, Surface
@@ -28,7 +29,7 @@ def varied_person(person: SceneObject, surface_names: Sequence[str], rng: np.ran
     tone = rng.uniform(0.4, 1.15) * rng.uniform(0.93, 1.07, 3)
     surfaces = []
     for name, surface in zip(surface_names, person.surfaces, strict=True):
-        if name in CLOTHES and rng.random() < 0.35:
+        if name in CLOTHES and rng.random() < 0.5:
             texture = pattern(rng)
         elif name in CLOTHES or name == "hair":
             texture = recoloured(surface.texture, rng)
@@ -69,21 +70,29 @@ def recoloured(texture: Image, rng: np.random.Generator) -> Image:
 
 
 def pattern(rng: np.random.Generator) -> Image:
-    """A cloth (S, S, 3) of one colour, with stripes, checks or blotches of one or two others."""
+    """A cloth (S, S, 3) of one colour, with stripes, checks or blotches of one or two others, half of them stark."""
     shape = (PATTERN_PX, PATTERN_PX)
     first, second, third = rng.integers(15, 245, (3, 3))
+    if rng.random() < 0.5:
+        second = rng.integers(215, 250, 3) if first.mean() < 130 else rng.integers(10, 50, 3)
     v, u = np.mgrid[:PATTERN_PX, :PATTERN_PX]
-    rows, columns = (axis // int(rng.integers(3, 28)) % 2 for axis in (v, u))
-    kind = int(rng.integers(5))
+    rows, columns = (_stripes(axis, rng) for axis in (v, u))
+    kind = rng.choice(["plain", "rows", "columns", "checks", "blotches"], p=(0.1, 0.35, 0.1, 0.3, 0.15))
     image = np.broadcast_to(first.astype(np.float32), (*shape, 3)).copy()
-    if kind in (1, 3):
-        image[rows > 0] = second
-    if kind in (2, 3):
-        image[columns > 0] = (image[columns > 0] + third) / 2
-    if kind == 4:
+    if kind in ("rows", "checks"):
+        image[rows] = second
+    if kind in ("columns", "checks"):
+        image[columns] = (image[columns] + third) / 2
+    if kind == "blotches":
         image[textures.noise(rng, shape, float(rng.uniform(4, 20)), octaves=3) > rng.uniform(0.2, 1.0)] = second
     shade = 1 + np.float32(0.1) * textures.noise(rng, shape, 12, octaves=4)
     return np.asarray(np.clip(image * shade[..., None], 0, 255), np.uint8)
+
+
+def _stripes(place: npt.NDArray[np.int64], rng: np.random.Generator) -> npt.NDArray[np.bool_]:
+    """Where along an axis the stripes lie; they and the gaps between them may differ in width."""
+    period = int(rng.integers(6, 56))
+    return np.less(place % period, rng.uniform(0.25, 0.75) * period)
 
 
 def _varied(surface: Surface, rng: np.random.Generator, share: float) -> Surface:
