@@ -62,9 +62,9 @@ def draw_change(rng: np.random.Generator, height: int, width: int) -> Change:
         turn = float(rng.normal(0.0, math.radians(5.0)))
         reach = 0.05 + max(zoom - 1.0, 0.0) / 2  # the image stays about full
         shift = (float(rng.uniform(-reach, reach)) * width, float(rng.uniform(-reach, reach)) * height)
-    brightness, contrast = rng.uniform(-20.0, 30.0), rng.uniform(0.7, 1.5)
-    tint = contrast * rng.uniform(0.9, 1.1, 3)
-    biases = brightness + rng.uniform(-8.0, 8.0, 3)
+    brightness, contrast = rng.uniform(-12.0, 16.0), rng.uniform(0.8, 1.25)
+    tint = contrast * rng.uniform(0.94, 1.06, 3)
+    biases = brightness + rng.uniform(-5.0, 5.0, 3)
     return Change(
         zoom=zoom,
         turn_rad=turn,
@@ -72,9 +72,9 @@ def draw_change(rng: np.random.Generator, height: int, width: int) -> Change:
         is_mirrored=bool(rng.random() < 0.5),
         gains=(float(tint[0]), float(tint[1]), float(tint[2])),
         biases=(float(biases[0]), float(biases[1]), float(biases[2])),
-        gamma=math.exp(rng.uniform(math.log(0.7), math.log(1.35))),
-        saturation=float(rng.uniform(0.5, 1.5)),
-        blur_px=int(rng.integers(2, 12)) if rng.random() < 0.3 else 0,
+        gamma=math.exp(rng.uniform(math.log(0.85), math.log(1.18))),
+        saturation=float(rng.uniform(0.7, 1.3)),
+        blur_px=int(rng.integers(2, 9)) if rng.random() < 0.2 else 0,
         blur_rad=float(rng.uniform(0.0, math.pi)),
         noise=float(rng.uniform(0.0, 5.0)),
     )

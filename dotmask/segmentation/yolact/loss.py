@@ -147,7 +147,7 @@ def _mask_loss(prototypes: Tensor, coefficients: Tensor, target: Target, box: Te
         scale, coefficients, box = len(box) / MOST_MASKS, coefficients[chosen], box[chosen]
     height, width = prototypes.shape[:2]
     wanted = _resized(target.masks, height, width)[box]
-    logits = (prototypes @ coefficients.T).permute(2, 0, 1)
+    logits = (coefficients @ prototypes.flatten(0, 1).T).view(-1, height, width)
     wrong = functional.binary_cross_entropy_with_logits(logits, wanted, reduction="none")
     left, top, right, bottom = (target.boxes[box] * wanted.new_tensor([width, height, width, height])).T[:, :, None]
     y, x = torch.arange(height, device=box.device), torch.arange(width, device=box.device)
