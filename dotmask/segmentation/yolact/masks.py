@@ -21,8 +21,8 @@ def assemble(prototypes: Tensor, coefficients: Tensor, boxes: Tensor) -> Tensor:
         coefficients: (N, K).
         boxes: (N, 4) `x1, y1, x2, y2`, shares of the image.
     """
-    masks = torch.sigmoid(prototypes @ coefficients.T).permute(2, 0, 1)
-    height, width = masks.shape[1:]
+    height, width = prototypes.shape[:2]
+    masks = torch.sigmoid(coefficients @ prototypes.flatten(0, 1).T).view(-1, height, width)
     x = torch.arange(width, device=masks.device, dtype=boxes.dtype)
     y = torch.arange(height, device=masks.device, dtype=boxes.dtype)
     left, top, right, bottom = (boxes * boxes.new_tensor([width, height, width, height])).T[:, :, None]
