@@ -15,6 +15,7 @@ from torch.nn import functional
 
 from dotmask.segmentation.yolact.anchors import CENTRE_VARIANCE, SIZE_VARIANCE
 from dotmask.segmentation.yolact.fast_nms import box_ious
+from dotmask.segmentation.yolact.masks import mask_logits, within_reach
 from dotmask.segmentation.yolact.network import Answer
 
 CLASS_WEIGHT, BOX_WEIGHT, MASK_WEIGHT, SEMANTIC_WEIGHT = 1.0, 1.5, 6.125, 1.0
@@ -133,7 +134,7 @@ def _class_loss(logits: Tensor, told: Tensor) -> Tensor:
 
 
 def _mask_loss(prototypes: Tensor, coefficients: Tensor, target: Target, box: Tensor) -> Tensor:
-    """Sum over the positives of the mean cross entropy inside the true box and one pixel around it.
+    """Sum over the positives of the mean cross entropy where `assemble` would let the mask of the true box be.
 
     The authors divide by the box alone. With prototypes as few as those of `compact`, a cup would count three times.
     They also take a pixel of the prototypes for one of the mask or not; here a pixel on the outline is so in part, and
@@ -147,12 +148,10 @@ def _mask_loss(prototypes: Tensor, coefficients: Tensor, target: Target, box: Te
         scale, coefficients, box = len(box) / MOST_MASKS, coefficients[chosen], box[chosen]
     height, width = prototypes.shape[:2]
     wanted = _resized(target.masks, height, width)[box]
-    logits = (coefficients @ prototypes.flatten(0, 1).T).view(-1, height, width)
+    logits = mask_logits(prototypes, coefficients)
     wrong = functional.binary_cross_entropy_with_logits(logits, wanted, reduction="none")
-    left, top, right, bottom = (target.boxes[box] * wanted.new_tensor([width, height, width, height])).T[:, :, None]
-    y, x = torch.arange(height, device=box.device), torch.arange(width, device=box.device)
-    in_box = ((y >= top - 1) & (y < bottom + 1))[:, :, None] & ((x >= left - 1) & (x < right + 1))[:, None, :]
-    summed: Tensor = scale * ((wrong * in_box).sum(dim=(1, 2)) / in_box.sum(dim=(1, 2))).sum()
+    counts = within_reach(target.boxes[box], height, width)
+    summed: Tensor = scale * ((wrong * counts).sum(dim=(1, 2)) / counts.sum(dim=(1, 2))).sum()
     return summed
 
 

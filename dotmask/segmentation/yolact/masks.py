@@ -21,15 +21,25 @@ def assemble(prototypes: Tensor, coefficients: Tensor, boxes: Tensor) -> Tensor:
         coefficients: (N, K).
         boxes: (N, 4) `x1, y1, x2, y2`, shares of the image.
     """
+    masks = torch.sigmoid(mask_logits(prototypes, coefficients))
+    return masks * within_reach(boxes, *prototypes.shape[:2])
+
+
+def mask_logits(prototypes: Tensor, coefficients: Tensor) -> Tensor:
+    """(N, h, w) of prototypes (h, w, K) and coefficients (N, K), in the whole image."""
     height, width = prototypes.shape[:2]
-    masks = torch.sigmoid(coefficients @ prototypes.flatten(0, 1).T).view(-1, height, width)
-    x = torch.arange(width, device=masks.device, dtype=boxes.dtype)
-    y = torch.arange(height, device=masks.device, dtype=boxes.dtype)
+    return (coefficients @ prototypes.flatten(0, 1).T).view(-1, height, width)
+
+
+def within_reach(boxes: Tensor, height: int, width: int) -> Tensor:
+    """(N, height, width) bool, where the mask of each box (N, 4) may be: inside of it, or `CROP_MARGIN_PX` beyond."""
+    x = torch.arange(width, device=boxes.device, dtype=boxes.dtype)
+    y = torch.arange(height, device=boxes.device, dtype=boxes.dtype)
     left, top, right, bottom = (boxes * boxes.new_tensor([width, height, width, height])).T[:, :, None]
     in_columns = (x >= left - CROP_MARGIN_PX) & (x < right + CROP_MARGIN_PX)
     in_rows = (y >= top - CROP_MARGIN_PX) & (y < bottom + CROP_MARGIN_PX)
-    cropped: Tensor = masks * (in_rows[:, :, None] & in_columns[:, None, :])
-    return cropped
+    reach: Tensor = in_rows[:, :, None] & in_columns[:, None, :]
+    return reach
 
 
 def full_size(masks: npt.NDArray[np.float32], height: int, width: int) -> npt.NDArray[np.bool_]:
