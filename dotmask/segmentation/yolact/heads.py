@@ -6,7 +6,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from dotmask.segmentation.yolact.pyramid import convolution
+from dotmask.segmentation.yolact.pyramid import added, convolution
 
 FINE_CHANNELS = 16
 """Of the features that the fine prototypes are made from: at half the size of the image, more would take long."""
@@ -51,17 +51,13 @@ class FinePrototypes(nn.Module):
 
     def forward(self, p3: Tensor, half: Tensor, quarter: Tensor) -> Tensor:
         """The prototypes before their ReLU (B, prototypes, h, w), as large as `half`."""
-        x = self.at_quarter(_merged(self.coarse(p3), self.quarter_lateral(quarter)))
-        prototypes: Tensor = self.at_half(_merged(x, self.half_lateral(half)))
+        x = self.at_quarter(functional.relu(added(self.coarse(p3), self.quarter_lateral(quarter))))
+        prototypes: Tensor = self.at_half(functional.relu(added(x, self.half_lateral(half))))
         return prototypes
 
 
 def _block(channels_in: int, channels: int, *, is_normalised: bool) -> tuple[nn.Module, nn.Module]:
     return convolution(channels_in, channels, is_normalised=is_normalised), nn.ReLU(inplace=True)
-
-
-def _merged(coarse: Tensor, fine: Tensor) -> Tensor:
-    return functional.relu(functional.interpolate(coarse, fine.shape[2:], mode="bilinear", align_corners=False) + fine)
 
 
 class PredictionHead(nn.Module):

@@ -15,6 +15,11 @@ def convolution(channels_in: int, channels: int, *, is_normalised: bool) -> nn.M
     return nn.Sequential(layer, nn.GroupNorm(channels // NORMALISED_TOGETHER, channels)) if is_normalised else layer
 
 
+def added(coarse: Tensor, fine: Tensor) -> Tensor:
+    """Features (B, C, h, w), stretched bilinearly, and finer ones (B, C, H, W)."""
+    return functional.interpolate(coarse, size=fine.shape[2:], mode="bilinear", align_corners=False) + fine
+
+
 class FeaturePyramid(nn.Module):
     """Levels P3 to P7 from C3, C4 and C5.
 
@@ -39,10 +44,7 @@ class FeaturePyramid(nn.Module):
         for lateral, feature in zip(self.lat_layers, reversed(features), strict=True):
             level: Tensor = lateral(feature)
             if merged:
-                coarser = functional.interpolate(
-                    merged[-1], size=feature.shape[2:], mode="bilinear", align_corners=False
-                )
-                level = coarser + level
+                level = added(merged[-1], level)
             merged.append(level)
         levels = [functional.relu(layer(level)) for layer, level in zip(self.pred_layers, merged, strict=True)]
         levels.reverse()
