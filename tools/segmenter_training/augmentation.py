@@ -60,7 +60,7 @@ def draw_change(rng: np.random.Generator, height: int, width: int) -> Change:
     if rng.random() < 0.6:
         zoom = math.exp(rng.uniform(math.log(0.5), math.log(1.7)))
         turn = float(rng.normal(0.0, math.radians(5.0)))
-        reach = 0.05 + max(zoom - 1.0, 0.0) / 2  # the image stays about full
+        reach = 0.05 + max(zoom - 1.0, 0.0) / 2  # an enlarged image stays about full
         shift = (float(rng.uniform(-reach, reach)) * width, float(rng.uniform(-reach, reach)) * height)
     brightness, contrast = rng.uniform(-12.0, 16.0), rng.uniform(0.8, 1.25)
     tint = contrast * rng.uniform(0.94, 1.06, 3)

@@ -65,8 +65,9 @@ def card(facts: Facts, on_held_out: SegmenterEvaluation, on_catalog: SegmenterEv
 
 Written by `{facts.command}`; no figure here was typed by hand.
 
-YOLACT's design on a small backbone (`dotmask/segmentation/yolact`), {facts.values / 1e6:.2f} million values, for
-{_listed(split.CLASSES)}; images are stretched to {WIDTH}x{HEIGHT}. Weights: `compact.safetensors`,
+YOLACT's design on a small backbone and with finer prototypes (`dotmask/segmentation/yolact`),
+{facts.values / 1e6:.2f} million values, for {_listed(split.CLASSES)}; images are stretched to
+{WIDTH}x{HEIGHT}. Weights: `compact.safetensors`,
 {facts.size_bytes / 1e6:.1f} MB, float32, CC0-1.0, SHA-256
 `{facts.sha256}`.
 
