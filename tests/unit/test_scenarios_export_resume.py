@@ -163,7 +163,7 @@ def test_memory_is_flat_in_the_number_of_frames(tmp_path: Path, monkeypatch: pyt
     held: dict[int, int] = {}
 
     def show(done: int) -> None:
-        if done in (40, 440):
+        if done in (40, 240, 440):
             gc.collect()
             # pathlib interns names, and the interpreter's table of those grows in jumps of megabytes.
             ours = tracemalloc.take_snapshot().filter_traces([tracemalloc.Filter(False, "*pathlib*")])
@@ -173,5 +173,6 @@ def test_memory_is_flat_in_the_number_of_frames(tmp_path: Path, monkeypatch: pyt
         tracemalloc.start()
         rendered(tmp_path / format_name, format_name, frames=441, show=show)
         tracemalloc.stop()
-        # A frame's images have 3 kB, and a single line of text a frame would be 40 kB.
-        assert held[440] - held[40] < 25_000, format_name
+        # A frame's images have 3 kB, and a single line of text a frame would be 20 kB in each half. What is kept
+        # grows in both; the interpreter's free lists fill up, and its tables grow in jumps, in one of them.
+        assert min(held[240] - held[40], held[440] - held[240]) < 12_500, format_name
