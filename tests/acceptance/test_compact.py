@@ -4,19 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from dotmask.assets import asset_file
-from dotmask.segmentation.networks import WEIGHTS_OF_COMPACT
 from scenarios.registry import scenario
 from scenarios.run import RunSettings, run
 from scenarios.spec import with_overrides
 
-pytestmark = [
-    pytest.mark.acceptance,
-    pytest.mark.skipif(
-        asset_file(WEIGHTS_OF_COMPACT) is None,
-        reason="no weights of compact are committed yet; python -m tools.train_segmenter --publish makes them",
-    ),
-]
+pytestmark = pytest.mark.acceptance
 
 
 def test_with_compact_odometry_is_about_as_good_as_with_the_oracle(tmp_path: Path) -> None:
