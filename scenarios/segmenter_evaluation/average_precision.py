@@ -3,6 +3,7 @@
 import contextlib
 import os
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,24 @@ from pycocotools.coco import COCO
 from pycocotools.cocoeval import COCOeval
 
 from dotmask.records import Detections, MaskImage
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Precision:
+    """Average precision of one class; None where there is nothing to be found.
+
+    Attributes:
+        ap: mean over the IoU 0.5 to 0.95.
+        ap50: at an IoU of 0.5.
+        ap50_small, ap50_medium, ap50_large: the same of COCO's sizes: fewer than 32 x 32 visible pixels, than 96 x 96,
+            and more.
+    """
+
+    ap: float | None
+    ap50: float | None
+    ap50_small: float | None
+    ap50_medium: float | None
+    ap50_large: float | None
 
 
 class AveragePrecision:
@@ -47,15 +66,21 @@ class AveragePrecision:
             if class_name in self._numbers:
                 self._found.append(self._annotation(image, class_name, mask, len(self._found) + 1) | {"score": score})
 
-    def by_class(self) -> dict[str, tuple[float | None, float | None]]:
-        """AP (mean over the IoU 0.5 to 0.95) and AP50 of each class; None where there is nothing to be found."""
+    def by_class(self) -> dict[str, Precision]:
+        """The figures of each class."""
         with open(os.devnull, "w", encoding="utf-8") as nowhere, contextlib.redirect_stdout(nowhere):
             evaluation = COCOeval(self._coco(self._true), self._coco(self._found), "segm")
             evaluation.evaluate()
             evaluation.accumulate()
-        # IoU, recall, class, area (the first is all), number of detections (the last is 100)
-        precision: npt.NDArray[np.float64] = evaluation.eval["precision"][:, :, :, 0, -1]
-        return {name: (_mean(precision[:, :, n]), _mean(precision[0, :, n])) for n, name in enumerate(self._numbers)}
+        # IoU, recall, class, area (all, small, medium, large), number of detections (the last is 100)
+        precision: npt.NDArray[np.float64] = evaluation.eval["precision"][..., -1]
+        figures = {}
+        for n, name in enumerate(self._numbers):
+            ap50, small, medium, large = (_mean(precision[0, :, n, area]) for area in range(4))
+            figures[name] = Precision(
+                ap=_mean(precision[:, :, n, 0]), ap50=ap50, ap50_small=small, ap50_medium=medium, ap50_large=large
+            )
+        return figures
 
     def _annotation(self, image: int, class_name: str, mask: MaskImage, number: int) -> dict[str, Any]:
         return {

@@ -29,6 +29,8 @@ class ClassFigures(Part):
     Attributes:
         ap: COCO's average precision of the masks, mean over the IoU 0.5 to 0.95; null where there were none.
         ap50: the same at an IoU of 0.5.
+        ap50_small, ap50_medium, ap50_large: the same of COCO's sizes, the bands of `misses["visible_px"]`; null where
+            there were none.
         iou: mean over the matched masks; null without any.
         seen: instances that were to be found, over all frames.
         missed: those of them that no detection of the class overlaps with an IoU of 0.5.
@@ -37,6 +39,9 @@ class ClassFigures(Part):
 
     ap: Measured
     ap50: Measured
+    ap50_small: Measured
+    ap50_medium: Measured
+    ap50_large: Measured
     iou: Measured
     seen: int
     missed: int
@@ -108,10 +113,10 @@ def headline(evaluation: SegmenterEvaluation) -> str:
 
 def class_table(evaluation: SegmenterEvaluation) -> Table:
     """A row a class."""
-    drawn = _table("class", "AP", "AP50", "IoU", "seen", "missed, %")
-    for name, figures in evaluation.classes.items():
-        numbers = (_number(value, 3) for value in (figures.ap, figures.ap50, figures.iou))
-        drawn.add_row(name, *numbers, str(figures.seen), _percent(figures.missed_share))
+    drawn = _table("class", "AP", "AP50", "small", "medium", "large", "IoU", "seen", "missed, %")
+    for name, f in evaluation.classes.items():
+        numbers = (f.ap, f.ap50, f.ap50_small, f.ap50_medium, f.ap50_large, f.iou)
+        drawn.add_row(name, *(_number(value, 3) for value in numbers), str(f.seen), _percent(f.missed_share))
     return drawn
 
 

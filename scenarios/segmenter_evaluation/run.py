@@ -1,6 +1,7 @@
 """Show frames of scenarios to a segmenter and compare what it finds with the truth."""
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from dotmask.segmentation.selection import select_detections
 from scenarios.bridge import rgbd_frame_from_sim
 from scenarios.errors import ScenarioError
 from scenarios.run import one_opencv_thread
-from scenarios.segmenter_evaluation.average_precision import AveragePrecision
+from scenarios.segmenter_evaluation.average_precision import AveragePrecision, Precision
 from scenarios.segmenter_evaluation.report import ClassFigures, Milliseconds, SegmenterEvaluation
 from scenarios.segmenter_evaluation.sightings import Sighting, band, misses, sightings_of, visible_actors
 from scenarios.segmenters import load_segmenter, segmenter_report, segmenter_threads
@@ -86,8 +87,8 @@ def evaluate_segmenter(
         profile=profile,
         scenarios=counts,
         classes={
-            class_name: _figures([s for s in sightings if s.class_name == class_name], *averages)
-            for class_name, averages in precision.by_class().items()
+            class_name: _figures([s for s in sightings if s.class_name == class_name], of_class)
+            for class_name, of_class in precision.by_class().items()
         },
         misses=misses(sightings),
         ms=Milliseconds(
@@ -112,12 +113,11 @@ def _true_masks(frame: SimFrame, scene: Scene, class_names: Sequence[str]) -> It
             yield thing.class_name, ids == number, number in counting
 
 
-def _figures(sightings: Sequence[Sighting], ap: float | None, ap50: float | None) -> ClassFigures:
+def _figures(sightings: Sequence[Sighting], precision: Precision) -> ClassFigures:
     overlaps = [s.iou for s in sightings if s.iou is not None]
     counted = band("", sightings)
     return ClassFigures(
-        ap=ap,
-        ap50=ap50,
+        **asdict(precision),
         iou=float(np.mean(overlaps)) if overlaps else None,
         seen=counted.seen,
         missed=counted.missed,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dotmask.records import Detections
-from scenarios.segmenter_evaluation.average_precision import AveragePrecision
+from scenarios.segmenter_evaluation.average_precision import AveragePrecision, Precision
 from scenarios.segmenter_evaluation.report import Band
 from scenarios.segmenter_evaluation.sightings import Sighting, misses, sightings_of
 from sim.records import CameraModel, GroundTruth, Moment, ObjectTruth, SimFrame
@@ -36,8 +36,8 @@ def precision_of(true: list[tuple[str, np.ndarray, bool]], *found: tuple[str, np
     precision = AveragePrecision(("person", "chair"))
     precision.see(SIZE, true, detections(*found))
     by_class = precision.by_class()
-    assert by_class["chair"] == (None, None)
-    return by_class["person"]
+    assert by_class["chair"] == Precision(ap=None, ap50=None, ap50_small=None, ap50_medium=None, ap50_large=None)
+    return by_class["person"].ap, by_class["person"].ap50
 
 
 ONE, TWO = [("person", mask(0), True)], [("person", mask(0), True), ("person", mask(50), True)]
@@ -64,6 +64,15 @@ AVERAGES = {
 def test_average_precision_by_hand(case: str) -> None:
     told, wanted = AVERAGES[case]
     assert told == tuple(None if value is None else pytest.approx(value, abs=1e-6) for value in wanted)
+
+
+def test_average_precision_by_size() -> None:
+    small, medium = mask(0, 34), mask(50, 35)  # 1020 and 1050 pixels, about 32 x 32
+    precision = AveragePrecision(("person",))
+    precision.see(SIZE, [("person", small, True), ("person", medium, True)], detections(("person", medium, 0.9)))
+    told = precision.by_class()["person"]
+    assert (told.ap50, told.ap50_medium) == pytest.approx((HALF, 1.0))
+    assert (told.ap50_small, told.ap50_large) == (0.0, None)
 
 
 @dataclass
@@ -186,7 +195,8 @@ def test_the_oracle_is_perfect_and_its_faults_are_not(dotmask) -> None:
         assert (one["ap"], one["ap50"], one["iou"], one["missed"]) == (1.0, 1.0, 1.0, 0)
         assert one["seen"] > 0
     assert figures["classes"]["cup"] == {
-        "ap": None, "ap50": None, "iou": None, "seen": 0, "missed": 0, "missed_share": None,
+        "ap": None, "ap50": None, "ap50_small": None, "ap50_medium": None, "ap50_large": None, "iou": None,
+        "seen": 0, "missed": 0, "missed_share": None,
     }  # fmt: skip
     assert figures["ms"]["median"] is None
     done = dotmask(*arguments, "--set", "faults.borders.pixels=-3", "--every", 21)

@@ -105,7 +105,8 @@ same settings on the same processor give the same weights.
 The frames are {sum(on_held_out.scenarios.values())} of {len(on_held_out.scenarios)} scenarios of random casts, places
 and camera paths in the five rooms of the catalog, {held_out.EVERY / 30:g} s apart, through the noise of either sensor,
 a quarter with motion blur and rolling shutter. An instance is to be found if it shows at least {MIN_PIXELS} pixels of
-640x480, however much of it is hidden; cups and bottles of the furniture count neither as found nor as wrong.
+640x480, however much of it is hidden; cups and bottles of the furniture count neither as found nor as wrong. Small,
+medium and large are COCO's, by visible pixels: fewer than 1024, fewer than 9216, and more.
 
 {_misses(on_held_out)}
 
@@ -155,11 +156,12 @@ def _catalog(*, is_seen: bool) -> str:
 
 
 def _results(evaluation: SegmenterEvaluation) -> str:
-    rows = [
-        [name, _number(f.ap50), _number(f.ap), _number(f.iou), str(f.seen), _percent(f.missed_share)]
-        for name, f in evaluation.classes.items()
-    ]
-    table = markdown_table(["class", "AP50", "AP", "IoU of the found", "to be found", "missed, %"], rows)
+    rows = []
+    for name, f in evaluation.classes.items():
+        numbers = (f.ap50, f.ap50_small, f.ap50_medium, f.ap50_large, f.ap, f.iou)
+        rows.append([name, *(_number(value) for value in numbers), str(f.seen), _percent(f.missed_share)])
+    header = ["class", "AP50", "small", "medium", "large", "AP", "IoU of the found", "to be found", "missed, %"]
+    table = markdown_table(header, rows)
     ms = evaluation.ms
     assert ms.median is not None
     assert ms.p95 is not None
