@@ -69,7 +69,7 @@ class SegmenterEvaluation(Part):
         profile: whose threshold and number decide `iou` and the misses.
         scenarios: the frames that were looked at, by scenario.
         classes: figures by class.
-        misses: by circumstance: `visible_px`, `distance_m`, `tilt_deg`, `truncated`, `blur_px`.
+        misses: by circumstance: `visible_px`, `hidden_percent`, `distance_m`, `tilt_deg`, `truncated`, `blur_px`.
         ms: see Milliseconds.
     """
 
@@ -88,6 +88,7 @@ class SegmenterEvaluation(Part):
 
 CIRCUMSTANCES = {
     "visible_px": "visible pixels",
+    "hidden_percent": "hidden by something, %",
     "distance_m": "distance, m",
     "tilt_deg": "tilt of the camera, deg",
     "truncated": "cut by the image's border",

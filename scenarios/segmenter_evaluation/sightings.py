@@ -25,6 +25,7 @@ class Sighting:
         class_name: of the instance.
         iou: with the detection of its class that it was matched to; None where it was missed.
         visible_px: how many pixels of it are seen.
+        hidden_percent: how much of what is inside the image something else hides.
         distance_m: from the camera to its centre.
         tilt_deg: by how much the camera is rolled.
         is_truncated: whether it touches the image's border.
@@ -34,6 +35,7 @@ class Sighting:
     class_name: str
     iou: float | None
     visible_px: int
+    hidden_percent: float
     distance_m: float
     tilt_deg: float
     is_truncated: bool
@@ -65,6 +67,7 @@ def sightings_of(
                 class_name=actor.class_name,
                 iou=iou if class_name == actor.class_name else None,
                 visible_px=actor.visible_pixels,
+                hidden_percent=100 * actor.occlusion,
                 distance_m=float(np.linalg.norm(actor.centre_world - truth.T_world_camera[:3, 3])),
                 tilt_deg=roll_deg(truth.T_world_camera),
                 is_truncated=actor.is_truncated,
@@ -95,7 +98,8 @@ def _blur_px(actor: ObjectTruth, frame: SimFrame, simulator: Simulator) -> float
     return float(np.linalg.norm(ends[1] - ends[0]))
 
 
-SIZES_PX, DISTANCES_M, TILTS_DEG, BLURS_PX = (0, 32**2, 96**2), (0, 1, 2, 3, 4, 6), (0, 10, 30, 60, 90), (0, 1, 3, 8)
+SIZES_PX, HIDDEN_PERCENT = (0, 32**2, 96**2), (0, 10, 50, 80)
+DISTANCES_M, TILTS_DEG, BLURS_PX = (0, 1, 2, 3, 4, 6), (0, 10, 30, 60, 90), (0, 1, 3, 8)
 """Lower ends of the bands; the last one is open. The sizes are COCO's small, medium and large."""
 
 
@@ -115,6 +119,7 @@ def misses(sightings: Sequence[Sighting]) -> dict[str, tuple[Band, ...]]:
     ]
     return {
         "visible_px": bands(SIZES_PX, lambda s: s.visible_px),
+        "hidden_percent": bands(HIDDEN_PERCENT, lambda s: s.hidden_percent),
         "distance_m": bands(DISTANCES_M, lambda s: s.distance_m),
         "tilt_deg": bands(TILTS_DEG, lambda s: s.tilt_deg),
         "truncated": tuple(one for one in cut if one.seen),

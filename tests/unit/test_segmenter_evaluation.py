@@ -115,7 +115,7 @@ def seen(index: int, speed_m_s: float = 0.0, pixels: int = 600, roll_deg: float 
         surface_speed_m_s=0.0,
         is_moving=False,
         visible_pixels=pixels,
-        occlusion=0.0,
+        occlusion=0.375,
         is_truncated=True,
         ideal_world=None,
     )
@@ -140,6 +140,7 @@ def test_circumstances_in_numbers() -> None:
     assert one.iou == pytest.approx(18 / 22)
     assert (one.class_name, one.is_truncated) == ("person", True)
     assert one.visible_px == seen(5).truth.objects[0].visible_pixels
+    assert one.hidden_percent == 37.5
     assert one.distance_m == pytest.approx(2.0)
     assert one.tilt_deg == pytest.approx(25.0)
     assert one.blur_px == pytest.approx(500 * 0.02 / 2), "f v t / z"
@@ -160,11 +161,12 @@ def test_what_counts_as_missed() -> None:
 
 
 def test_bands_add_up() -> None:
-    def sighting(distance_m: float, *, found: bool, visible_px: int = 5000) -> Sighting:
+    def sighting(distance_m: float, *, found: bool, visible_px: int = 5000, hidden: float = 0.0) -> Sighting:
         return Sighting(
             class_name="cup",
             iou=0.8 if found else None,
             visible_px=visible_px,
+            hidden_percent=hidden,
             distance_m=distance_m,
             tilt_deg=0.0,
             is_truncated=False,
@@ -172,13 +174,18 @@ def test_bands_add_up() -> None:
         )
 
     told = misses(
-        [sighting(1.0, found=True), sighting(1.99, found=False), sighting(50.0, found=False, visible_px=1023)]
+        [
+            sighting(1.0, found=True),
+            sighting(1.99, found=False),
+            sighting(50.0, found=False, visible_px=1023, hidden=80.0),
+        ]
     )
     assert told["distance_m"] == (
         Band(label="1 to 2", seen=2, missed=1, missed_share=0.5),
         Band(label="6 and more", seen=1, missed=1, missed_share=1.0),
     )
     assert [(band.label, band.missed) for band in told["visible_px"]] == [("0 to 1024", 1), ("1024 to 9216", 1)]
+    assert [(band.label, band.seen) for band in told["hidden_percent"]] == [("0 to 10", 2), ("80 and more", 1)]
     assert [band.label for band in told["blur_px"]] == ["8 and more"]
     assert told["truncated"] == (Band(label="no", seen=3, missed=2, missed_share=2 / 3),)
 
