@@ -79,9 +79,11 @@ class MaskRcnnSegmenter:
             torch.autocast(self._device.type, torch.float16, enabled=self._device.type == "cuda"),
         ):
             found = self._network([image])[0]
+        masks = found["masks"][:, 0] > THRESHOLD
+        shown = masks.any(dim=2).any(dim=1)
         return detections_from(
-            (found["masks"][:, 0] > THRESHOLD).cpu().numpy(),
-            found["boxes"].float().cpu().numpy(),
-            [self._class_names[label] for label in found["labels"].tolist()],
-            found["scores"].float().cpu().numpy(),
+            masks[shown].cpu().numpy(),
+            found["boxes"][shown].float().cpu().numpy(),
+            [self._class_names[label] for label in found["labels"][shown].tolist()],
+            found["scores"][shown].float().cpu().numpy(),
         )

@@ -14,7 +14,8 @@ from dotmask.segmentation.yolact.deformable import DeformableConv2d, deformable_
 from dotmask.segmentation.yolact.design import COMPACT, YOLACT, YOLACT_PLUS, YolactDesign
 from dotmask.segmentation.yolact.fast_nms import fast_nms
 from dotmask.segmentation.yolact.images import network_image
-from dotmask.segmentation.yolact.masks import assemble, full_size
+from dotmask.segmentation.yolact.mask_kernels import stretched_above
+from dotmask.segmentation.yolact.masks import assemble
 
 torch.set_num_threads(1)
 SIZES = {
@@ -154,13 +155,21 @@ def slow_bilinear(image: np.ndarray, height: int, width: int) -> np.ndarray:
 
 
 def test_masks_at_the_size_of_the_image() -> None:
-    soft = torch.rand(2, 5, 7, generator=torch.Generator().manual_seed(4))
+    soft = torch.rand(6, 5, 7, generator=torch.Generator().manual_seed(4))
+    soft[1, :, :3] = soft[2, :2] = soft[3, :, 5:] = soft[4, 3:] = 0  # outside of a box
+    soft[5] = 0
     for size in ((23, 31), (4, 3)):
-        masks = full_size(soft.numpy(), *size)
-        for mask, known in zip(masks, soft, strict=True):
+        masks, kept = stretched_above(soft.numpy(), 0.5, *size, 1)
+        np.testing.assert_array_equal(kept, range(5))
+        for mask, known in zip(masks, soft[:5], strict=True):
             np.testing.assert_array_equal(mask, slow_bilinear(known.numpy(), *size) > 0.5)
         by_torch = functional.interpolate(soft[None], size, mode="bilinear", align_corners=False)[0] > 0.5
-        np.testing.assert_array_equal(masks, by_torch)
+        np.testing.assert_array_equal(masks, by_torch[:5])
+        pixels = by_torch.sum(dim=(1, 2))
+        large = pixels >= pixels.median()
+        masks, kept = stretched_above(soft.numpy(), 0.5, *size, int(pixels.median()))
+        np.testing.assert_array_equal(masks, by_torch[large])
+        np.testing.assert_array_equal(kept, np.flatnonzero(large))
 
 
 def test_images_are_stretched_and_normalised() -> None:

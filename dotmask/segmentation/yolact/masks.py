@@ -1,8 +1,5 @@
 """Masks as combinations of prototypes (YOLACT, section "Mask Assembly")."""
 
-import cv2
-import numpy as np
-import numpy.typing as npt
 import torch
 from torch import Tensor
 
@@ -21,8 +18,8 @@ def assemble(prototypes: Tensor, coefficients: Tensor, boxes: Tensor) -> Tensor:
         coefficients: (N, K).
         boxes: (N, 4) `x1, y1, x2, y2`, shares of the image.
     """
-    masks = torch.sigmoid(mask_logits(prototypes, coefficients))
-    return masks * within_reach(boxes, *prototypes.shape[:2])
+    # In place: memory costs more here than arithmetic.
+    return mask_logits(prototypes, coefficients).sigmoid_().mul_(within_reach(boxes, *prototypes.shape[:2]))
 
 
 def mask_logits(prototypes: Tensor, coefficients: Tensor) -> Tensor:
@@ -40,14 +37,3 @@ def within_reach(boxes: Tensor, height: int, width: int) -> Tensor:
     in_rows = (y >= top - CROP_MARGIN_PX) & (y < bottom + CROP_MARGIN_PX)
     reach: Tensor = in_rows[:, :, None] & in_columns[:, None, :]
     return reach
-
-
-def full_size(masks: npt.NDArray[np.float32], height: int, width: int) -> npt.NDArray[np.bool_]:
-    """Masks (N, h, w) in 0..1, stretched bilinearly to the image, as masks (N, height, width) of bool.
-
-    OpenCV does it several times faster than PyTorch on a CPU, and with a GPU less is copied from it.
-    """
-    stretched = np.zeros((len(masks), height, width), np.bool_)
-    for whole, mask in zip(stretched, masks, strict=True):
-        np.greater(cv2.resize(mask, (width, height), interpolation=cv2.INTER_LINEAR), THRESHOLD, out=whole)
-    return stretched

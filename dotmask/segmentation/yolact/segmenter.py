@@ -9,7 +9,8 @@ from dotmask.segmentation.yolact.anchors import anchors_of, decode
 from dotmask.segmentation.yolact.design import YolactDesign
 from dotmask.segmentation.yolact.fast_nms import LEAST_SCORE, Detected, fast_nms
 from dotmask.segmentation.yolact.images import network_image
-from dotmask.segmentation.yolact.masks import assemble, full_size
+from dotmask.segmentation.yolact.mask_kernels import stretched_above
+from dotmask.segmentation.yolact.masks import THRESHOLD, assemble
 from dotmask.segmentation.yolact.network import Yolact
 
 
@@ -37,13 +38,14 @@ class YolactSegmenter:
             )
             best = found.scores >= LEAST_SCORE
             edges_px = found.boxes[best] * found.boxes.new_tensor([width, height, width, height])
-            names = [self._design.class_names[index] for index in found.classes[best].tolist()]
+            whole, kept = stretched_above(
+                masks[best].cpu().numpy(), THRESHOLD, height, width, self._design.least_mask_px
+            )
             return detections_from(
-                full_size(masks[best].cpu().numpy(), height, width),
-                edges_px.cpu().numpy(),
-                names,
-                found.scores[best].cpu().numpy(),
-                self._design.least_mask_px,
+                whole,
+                edges_px.cpu().numpy()[kept],
+                [self._design.class_names[index] for index in found.classes[best].cpu().numpy()[kept]],
+                found.scores[best].cpu().numpy()[kept],
             )
 
     def _instances(self, image: Tensor) -> tuple[Detected, Tensor]:

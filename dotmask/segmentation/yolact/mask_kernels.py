@@ -1,0 +1,80 @@
+"""Stretching of masks to the size of the image. Compiled by numba."""
+
+# mypy: ignore-errors
+# (numba infers the types of these functions from their arguments; numpy's own annotations do not describe them)
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True, nogil=True)
+def stretched_above(masks, threshold, height, width, least_px):
+    """Masks stretched bilinearly to an image, where they are above a threshold; those that are large enough.
+
+    The image's borders lie on those of the mask, and beyond its outermost pixel centres a mask goes on as it is there.
+    Only where a mask is not 0 is anything done.
+
+    Args:
+        masks: (N, h, w) float32, at least 0.
+        threshold: at least 0.
+        height: of the image.
+        width: of the image.
+        least_px: so many pixels of the image are enough, at least 1.
+
+    Returns:
+        (M, height, width) bool, and which of the masks they are: (M,) intp, ascending.
+    """
+    whole = np.zeros((len(masks), height, width), np.bool_)
+    rows, columns = masks.shape[1:]
+    upper, lower, down = _neighbours(rows, height)
+    left, right, across = _neighbours(columns, width)
+    widened = np.empty((rows, width), np.float32)
+    limit = np.float32(threshold)
+    kept = np.empty(len(masks), np.intp)
+    count = 0
+    for n in range(len(masks)):
+        top, bottom, first, last = rows, -1, columns, -1
+        for i in range(rows):
+            for j in range(columns):
+                if masks[n, i, j] > 0:
+                    top, bottom = min(top, i), i
+                    first, last = min(first, j), max(last, j)
+        if bottom < 0:
+            continue
+        begin, end = np.searchsorted(right, first), np.searchsorted(left, last + 1)
+        for i in range(top, bottom + 1):
+            for u in range(begin, end):
+                one, other = masks[n, i, left[u]], masks[n, i, right[u]]
+                widened[i, u] = one + (other - one) * across[u]
+        start, stop = np.searchsorted(lower, top), np.searchsorted(upper, bottom + 1)
+        pixels = 0
+        for v in range(start, stop):
+            # Rows beyond those that were widened are 0.
+            above = np.float32(upper[v] >= top)
+            below = np.float32(lower[v] <= bottom)
+            i, k = max(upper[v], top), min(lower[v], bottom)
+            one, other, row = widened[i, begin:end], widened[k, begin:end], whole[count, v, begin:end]
+            for u in range(len(row)):
+                value = above * one[u]
+                value += (below * other[u] - value) * down[v]
+                row[u] = value > limit
+                pixels += row[u]
+        if pixels >= least_px:
+            kept[count] = n
+            count += 1
+        else:
+            whole[count, start:stop, begin:end] = False
+    return whole[:count], kept[:count]
+
+
+@njit(cache=True, nogil=True)
+def _neighbours(length, stretched):
+    """Of each pixel along a stretched side the two pixels it lies between, and how near it is to the second, 0 to 1."""
+    first, second = np.empty(stretched, np.intp), np.empty(stretched, np.intp)
+    share = np.empty(stretched, np.float32)
+    for n in range(stretched):
+        place = min(max((n + 0.5) * length / stretched - 0.5, 0.0), length - 1.0)
+        first[n] = int(place)
+        second[n] = min(first[n] + 1, length - 1)
+        share[n] = place - first[n]
+    return first, second, share
