@@ -42,22 +42,17 @@ def stretched_above(masks, threshold, height, width, least_px):
         if bottom < 0:
             continue
         begin, end = np.searchsorted(right, first), np.searchsorted(left, last + 1)
-        for i in range(top, bottom + 1):
+        for i in range(max(top - 1, 0), min(bottom + 2, rows)):  # the rows around it are 0, and blended with it
             for u in range(begin, end):
                 one, other = masks[n, i, left[u]], masks[n, i, right[u]]
                 widened[i, u] = one + (other - one) * across[u]
         start, stop = np.searchsorted(lower, top), np.searchsorted(upper, bottom + 1)
         pixels = 0
         for v in range(start, stop):
-            # Rows beyond those that were widened are 0.
-            above = np.float32(upper[v] >= top)
-            below = np.float32(lower[v] <= bottom)
-            i, k = max(upper[v], top), min(lower[v], bottom)
-            one, other, row = widened[i, begin:end], widened[k, begin:end], whole[count, v, begin:end]
+            above, below = widened[upper[v], begin:end], widened[lower[v], begin:end]
+            row = whole[count, v, begin:end]
             for u in range(len(row)):
-                value = above * one[u]
-                value += (below * other[u] - value) * down[v]
-                row[u] = value > limit
+                row[u] = above[u] + (below[u] - above[u]) * down[v] > limit
                 pixels += row[u]
         if pixels >= least_px:
             kept[count] = n

@@ -37,16 +37,14 @@ class YolactSegmenter:
                 network_image(frame.rgb, self._design.height, self._design.width, self._device)
             )
             best = found.scores >= LEAST_SCORE
-            edges_px = found.boxes[best] * found.boxes.new_tensor([width, height, width, height])
+            edges_px = found.boxes * found.boxes.new_tensor([width, height, width, height])
             whole, kept = stretched_above(
                 masks[best].cpu().numpy(), THRESHOLD, height, width, self._design.least_mask_px
             )
-            return detections_from(
-                whole,
-                edges_px.cpu().numpy()[kept],
-                [self._design.class_names[index] for index in found.classes[best].cpu().numpy()[kept]],
-                found.scores[best].cpu().numpy()[kept],
+            edges, classes, scores = (
+                part[best].cpu().numpy()[kept] for part in (edges_px, found.classes, found.scores)
             )
+            return detections_from(whole, edges, [self._design.class_names[index] for index in classes], scores)
 
     def _instances(self, image: Tensor) -> tuple[Detected, Tensor]:
         """Detections in an image, and their masks (N, h, w) in 0..1 at the size of the prototypes."""
