@@ -18,5 +18,5 @@ def test_with_compact_odometry_is_about_as_good_as_with_the_oracle(tmp_path: Pat
     unmasked, oracle, network = (methods[name] for name in ("unmasked", "dotmask-oracle", "dotmask"))
     assert network.ate_rmse_m <= 1.5 * oracle.ate_rmse_m + 0.003
     assert network.ate_rmse_m < unmasked.ate_rmse_m / 5
-    assert network.masks.iou > 0.7
-    assert network.masks.leak < 0.15, "unmasked all of it leaks"
+    assert network.masks.iou > 0.75
+    assert network.masks.leak < 0.05
