@@ -11,6 +11,7 @@ from safetensors.torch import load_file
 
 from dotmask import assets
 from dotmask.errors import SegmenterError
+from dotmask.records import Intrinsics, RgbdFrame
 from dotmask.segmentation.networks import WEIGHTS_OF_COMPACT, choose_network, load_network
 from dotmask.segmentation.yolact.design import COMPACT
 from dotmask.segmentation.yolact.images import network_image
@@ -24,12 +25,12 @@ from sim.things.chairs import CHAIR_LOOKS
 from tools.segmenter_training import held_out, split
 from tools.segmenter_training.augmentation import LEAST_PX, Change, changed, draw_change, target_of
 from tools.segmenter_training.errors import TrainingError
-from tools.segmenter_training.frames import FrameStore, LabelledFrame, labelled, render_frames
+from tools.segmenter_training.frames import FrameStore, LabelledFrame, halved, labelled, render_frames
 from tools.segmenter_training.places import Places
-from tools.segmenter_training.scenes import HEIGHT, WIDTH, build_scene, draw_moment, draw_scenario
+from tools.segmenter_training.scenes import build_scene, draw_moment, draw_scenario
 from tools.segmenter_training.state import FILE, Settings
 from tools.segmenter_training.team import Team, team
-from tools.segmenter_training.training import LOSSES, WEIGHTS, frames_of_step, learning_rate, normalised, train
+from tools.segmenter_training.training import LOSSES, WEIGHTS, frames_of_step, learning_rate, network_images, train
 from tools.train_vocabulary.rooms import random_room
 
 DESIGN = replace(
@@ -62,7 +63,8 @@ def toy_frame(rng: np.random.Generator, height: int = 64, width: int = 96) -> La
     bar = (abs(u - rng.integers(10, width - 10)) < 7) & (abs(v - height // 2) < 22)
     for label, mask, colour in ((1, disc, (220, 60, 60)), (2, bar, (60, 60, 230))):
         rgb[mask], labels[mask] = colour, label
-    return LabelledFrame(rgb=rgb, labels=labels, classes=(1, 0))
+    depth_mm = np.where(labels > 0, 1500 + 200 * labels.astype(int), 4000).astype(np.uint16)
+    return LabelledFrame(rgb=rgb, depth_mm=depth_mm, labels=labels, classes=(1, 0))
 
 
 @pytest.fixture(scope="module")
@@ -129,10 +131,13 @@ def test_a_scene_gives_the_same_frames_twice_and_each_is_worth_looking_at() -> N
     first, again = render_frames(5, 1, 5), render_frames(5, 1, 3)
     for one, other in zip(first, again, strict=False):
         np.testing.assert_array_equal(one.rgb, other.rgb)
+        np.testing.assert_array_equal(one.depth_mm, other.depth_mm)
         np.testing.assert_array_equal(one.labels, other.labels)
         assert one.classes == other.classes
     for frame in first:
-        assert frame.rgb.shape == (HEIGHT, WIDTH, 3)
+        assert frame.rgb.shape == (COMPACT.height, COMPACT.width, 3)
+        assert frame.labels.shape == frame.depth_mm.shape == (COMPACT.height, COMPACT.width)
+        assert 0.3 < np.mean(frame.depth_mm > 0) < 1.0, "the depth is that of a sensor, not that of the renderer"
         assert set(np.unique(frame.labels)) <= set(range(len(frame.classes) + 1))
     assert len({len(frame.classes) for frame in first}) > 1 or len({frame.rgb.tobytes() for frame in first}) == 5
 
@@ -187,6 +192,11 @@ def test_a_change_moves_image_masks_and_boxes_alike(toys: list[LabelledFrame]) -
     assert np.mean(labels != got.labels) < 0.02, "pixels on the rim may go either way"
     is_red = (got.rgb[..., 0] > 150) & (got.rgb[..., 2] < 110)
     assert np.mean(is_red != (got.labels == 1)) < 0.03, "the picture went elsewhere than its mask"
+    wanted_mm = np.where(got.labels > 0, 1500 + 200 * got.labels.astype(int), 4000) / 1.3
+    is_near = abs(got.depth_mm - wanted_mm) < 1.0
+    has_image = got.depth_mm > 0
+    assert np.mean(is_near[has_image]) > 0.98, "the depth went elsewhere than its mask, or did not come nearer"
+    np.testing.assert_array_equal(has_image[4:-4, 4:-4], True)
     target = target_of(got)
     for box, class_index in zip(target.boxes.numpy(), target.classes.tolist(), strict=True):
         v, u = np.nonzero(got.labels == got.classes.index(class_index) + 1)
@@ -210,6 +220,12 @@ def test_a_change_of_nothing_is_none_and_colours_move_no_label(toys: list[Labell
     np.testing.assert_array_equal(brighter.rgb[..., 1:], frame.rgb[..., 1:])
     grey = changed(frame, Change(saturation=0.0), np.random.default_rng(0)).rgb
     np.testing.assert_allclose(grey.astype(float), frame.rgb.mean(axis=2, keepdims=True) * np.ones(3), atol=1.0)
+    late = changed(frame, Change(late_px=(3.0, -2.0)), np.random.default_rng(0))
+    np.testing.assert_array_equal(late.rgb, frame.rgb)
+    np.testing.assert_array_equal(late.depth_mm[:-2, 3:], frame.depth_mm[2:, :-3])
+    blind = changed(frame, Change(zoom=1.2, has_depth=False), np.random.default_rng(0))
+    assert not blind.depth_mm.any()
+    assert 0.0 < np.mean([not c.has_depth for c in drawn]) < 0.2
     noisy = changed(replace(frame, rgb=np.full_like(frame.rgb, 128)), Change(noise=4.0), np.random.default_rng(0)).rgb
     assert noisy.std() == pytest.approx(4.0, rel=0.05)
 
@@ -217,15 +233,51 @@ def test_a_change_of_nothing_is_none_and_colours_move_no_label(toys: list[Labell
 def test_specks_are_not_to_be_found() -> None:
     labels = np.zeros((64, 96), np.uint8)
     labels[:19, 0], labels[10:15, 10:14] = 1, 2
-    frame = LabelledFrame(rgb=np.zeros((64, 96, 3), np.uint8), labels=labels, classes=(0, 3))
+    frame = LabelledFrame(
+        rgb=np.zeros((64, 96, 3), np.uint8), depth_mm=np.zeros((64, 96), np.uint16), labels=labels, classes=(0, 3)
+    )
     assert target_of(frame).classes.tolist() == [3], "19 pixels are a speck, 20 are not"
 
 
-def test_images_are_normalised_as_the_segmenter_does() -> None:
-    images = np.random.default_rng(0).integers(0, 256, (2, 64, 96, 3), dtype=np.uint8)
-    wanted = torch.cat([network_image(image, 64, 96, torch.device("cpu")) for image in images])
-    torch.testing.assert_close(normalised(images), wanted, atol=1e-5, rtol=0)
-    assert normalised(images).is_contiguous(memory_format=torch.channels_last)
+def test_a_frame_is_halved_as_the_segmenter_does_it() -> None:
+    """Against what the network is given of the whole frame, and a count of labels pixel by pixel."""
+    rng = np.random.default_rng(0)
+    whole = LabelledFrame(
+        rgb=rng.integers(0, 256, (128, 192, 3), dtype=np.uint8),
+        depth_mm=(rng.integers(300, 6000, (128, 192)) * rng.integers(0, 2, (128, 192))).astype(np.uint16),
+        labels=rng.integers(0, 4, (128, 192)).astype(np.uint8),
+        classes=(0, 1, 2),
+    )
+    half = halved(whole)
+    for v in range(64):
+        for u in range(96):
+            counts = np.bincount(whole.labels[2 * v : 2 * v + 2, 2 * u : 2 * u + 2].ravel())
+            assert half.labels[v, u] == np.flatnonzero(counts == counts.max())[-1 if counts.max() == 2 else 0] or (
+                counts.max() == 1
+            ), "four different labels: any"
+    given, made = (network_image(shown(frame), DESIGN, torch.device("cpu")) for frame in (whole, half))
+    # Colours of a stored frame are whole grey levels.
+    torch.testing.assert_close(given[:, :3], made[:, :3], atol=0.5 / 57 + 1e-5, rtol=0)
+    torch.testing.assert_close(given[:, 3:], made[:, 3:], atol=1e-5, rtol=0)
+
+
+def shown(frame: LabelledFrame) -> RgbdFrame:
+    """What a segmenter is given of it."""
+    height, width = frame.labels.shape
+    return RgbdFrame(
+        index=0,
+        timestamp_s=0.0,
+        rgb=frame.rgb,
+        depth_m=frame.depth_mm.astype(np.float32) / 1000,
+        intrinsics=Intrinsics(width=width, height=height, fx=90.0, fy=90.0, cx=width / 2, cy=height / 2),
+    )
+
+
+def test_images_are_normalised_as_the_segmenter_does(toys: list[LabelledFrame]) -> None:
+    wanted = torch.cat([network_image(shown(frame), DESIGN, torch.device("cpu")) for frame in toys])
+    got = network_images(toys)
+    torch.testing.assert_close(got, wanted, atol=1e-5, rtol=0)
+    assert got.is_contiguous(memory_format=torch.channels_last)
 
 
 def test_every_epoch_sees_every_frame_once_in_an_order_of_its_own() -> None:
@@ -311,6 +363,7 @@ def test_frames_come_back_from_disk_and_what_is_missing_is_said(toys: list[Label
     store.write(1, toys[:2])
     assert (len(store), store.missing()) == (4, [0])
     np.testing.assert_array_equal(store[3].rgb, toys[1].rgb)
+    np.testing.assert_array_equal(store[3].depth_mm, toys[1].depth_mm)
     np.testing.assert_array_equal(store[3].labels, toys[1].labels)
     assert store[3].classes == toys[1].classes
     with pytest.raises(TrainingError, match="scene 0 is missing or damaged"):

@@ -144,7 +144,9 @@ def test_a_small_network_learns_one_picture_by_heart() -> None:
     )
     torch.manual_seed(0)
     network, anchors = Yolact(design), anchors_of(design)
-    images = network_image(rgb, 64, 96, CPU).repeat(2, 1, 1, 1)
+    camera = Intrinsics(width=96, height=64, fx=90.0, fy=90.0, cx=47.5, cy=31.5)
+    frame = RgbdFrame(index=0, timestamp_s=0.0, rgb=rgb, depth_m=np.ones((64, 96), np.float32), intrinsics=camera)
+    images = network_image(frame, design, CPU).repeat(2, 1, 1, 1)
     optimiser = torch.optim.Adam(network.parameters(), lr=2e-3)
     history: list[Losses] = []
     for _ in range(60):
@@ -155,8 +157,6 @@ def test_a_small_network_learns_one_picture_by_heart() -> None:
         history.append(Losses(*(part.detach() for part in losses)))
     for first, last in zip(history[0], history[-1], strict=True):
         assert last < 0.5 * first, (history[0], history[-1])
-    camera = Intrinsics(width=96, height=64, fx=90.0, fy=90.0, cx=47.5, cy=31.5)
-    frame = RgbdFrame(index=0, timestamp_s=0.0, rgb=rgb, depth_m=np.ones((64, 96), np.float32), intrinsics=camera)
     found = YolactSegmenter(network, design, CPU).segment(frame)
     assert found.class_names[:2] in (("chair", "person"), ("person", "chair"))
     ious = mask_ious(found.masks, np.where(disc, 1, np.where(bar, 2, 0)).astype(np.uint16))

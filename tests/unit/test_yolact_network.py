@@ -289,7 +289,7 @@ def test_nothing_found_is_no_error() -> None:
 
 def test_training_gives_a_semantic_answer_too() -> None:
     network = make(COMPACT).train()
-    answer = network(torch.zeros(2, 3, 240, 320))
+    answer = network(torch.zeros(2, 4, 240, 320))
     assert answer.semantic.shape == (2, 4, 30, 40)
     assert answer.prototypes.shape == (2, 120, 160, 24)
     assert answer.offsets.shape == (2, 9636, 4)

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,11 +10,12 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
+from dotmask.records import Intrinsics, RgbdFrame
 from dotmask.segmentation.yolact.anchors import anchors_of, decode
 from dotmask.segmentation.yolact.deformable import DeformableConv2d, deformable_conv2d
 from dotmask.segmentation.yolact.design import COMPACT, YOLACT, YOLACT_PLUS, YolactDesign
 from dotmask.segmentation.yolact.fast_nms import fast_nms
-from dotmask.segmentation.yolact.images import network_image
+from dotmask.segmentation.yolact.images import colour_channels, depth_channel, network_image, stretched
 from dotmask.segmentation.yolact.mask_kernels import stretched_above
 from dotmask.segmentation.yolact.masks import assemble
 
@@ -174,11 +176,37 @@ def test_masks_at_the_size_of_the_image() -> None:
 
 def test_images_are_stretched_and_normalised() -> None:
     rgb = np.random.default_rng(5).integers(0, 256, (11, 14, 3), dtype=np.uint8)
-    image = network_image(rgb, 7, 19, torch.device("cpu"))
+    image = colour_channels(rgb, 7, 19, torch.device("cpu"))
     assert image.shape == (1, 3, 7, 19)
     for channel, mean, std in ((0, 123.68, 58.40), (1, 116.78, 57.12), (2, 103.94, 57.38)):
         wanted = (slow_bilinear(rgb[..., channel].astype(float), 7, 19) - mean) / std
         np.testing.assert_allclose(image[0, channel], wanted, atol=1e-5)
+
+
+def test_depth_is_given_as_its_inverse_from_the_nearest_pixel() -> None:
+    rng = np.random.default_rng(6)
+    depth_m = rng.uniform(0.5, 6.0, (11, 14)).astype(np.float32)
+    depth_m[rng.random(depth_m.shape) < 0.3] = 0.0
+    for height, width in ((7, 19), (22, 7), (11, 14)):
+        got = stretched(depth_m, height, width)
+        for v, u in itertools.product(range(height), range(width)):
+            # The centre of the pixel, in the image's own rows and columns.
+            row, column = (v + 0.5) * 11 / height, (u + 0.5) * 14 / width
+            assert got[v, u] == depth_m[int(row), int(column)]
+    told = depth_channel(torch.tensor([0.0, 0.5, 1.0, 2.5]))
+    torch.testing.assert_close(told, torch.tensor([-0.4, 1.6, 0.6, 0.0]) / 0.3)
+    frame = RgbdFrame(
+        index=0,
+        timestamp_s=0.0,
+        rgb=rng.integers(0, 256, (11, 14, 3), dtype=np.uint8),
+        depth_m=depth_m,
+        intrinsics=Intrinsics(width=14, height=11, fx=10.0, fy=10.0, cx=6.5, cy=5.0),
+    )
+    device = torch.device("cpu")
+    image = network_image(frame, replace(COMPACT, height=22, width=7), device)
+    torch.testing.assert_close(image[:, :3], colour_channels(frame.rgb, 22, 7, device))
+    torch.testing.assert_close(image[0, 3], depth_channel(torch.tensor(stretched(depth_m, 22, 7))))
+    assert network_image(frame, YOLACT, device).shape == (1, 3, 550, 550), "YOLACT knows colours alone"
 
 
 def slow_deformable(x, offsets, modulation, weight, bias, stride: int, padding: int) -> Tensor:

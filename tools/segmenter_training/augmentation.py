@@ -11,7 +11,7 @@ import torch
 
 from dotmask.segmentation.yolact.loss import Target
 from sim.randomness import child
-from tools.segmenter_training.frames import LabelledFrame
+from tools.segmenter_training.frames import MOST_MM, LabelledFrame
 
 LEAST_PX = 20
 """An instance with fewer pixels of the network's image is nothing to be found: the judge begins at 80 of 640x480."""
@@ -34,6 +34,8 @@ class Change:
         blur_px: length of the motion blur; below 2 there is none.
         blur_rad: its direction.
         noise: standard deviation of a channel, grey levels.
+        late_px: by how much the depth lies beside the colour, right and down: cameras take them one after the other.
+        has_depth: whether the camera gives any.
     """
 
     zoom: float = 1.0
@@ -47,6 +49,8 @@ class Change:
     blur_px: int = 0
     blur_rad: float = 0.0
     noise: float = 0.0
+    late_px: tuple[float, float] = (0.0, 0.0)
+    has_depth: bool = True
 
     @property
     def moves(self) -> bool:
@@ -77,25 +81,35 @@ def draw_change(rng: np.random.Generator, height: int, width: int) -> Change:
         blur_px=int(rng.integers(2, 9)) if rng.random() < 0.2 else 0,
         blur_rad=float(rng.uniform(0.0, math.pi)),
         noise=float(rng.uniform(0.0, 5.0)),
+        late_px=(float(rng.normal(0.0, 1.5)), float(rng.normal(0.0, 1.5))) if rng.random() < 0.2 else (0.0, 0.0),
+        has_depth=bool(rng.random() < 0.95),
     )
 
 
 def changed(frame: LabelledFrame, change: Change, rng: np.random.Generator) -> LabelledFrame:
-    """The frame after a change; what leaves the image is grey there, and has no label.
+    """The frame after a change; where there was nothing it is grey, without depth and label.
+
+    A frame that is zoomed is one from nearer: its depths shrink as its sizes grow.
 
     Args:
         frame: of the training.
         change: to make.
         rng: of the noise.
     """
-    rgb, labels = frame.rgb, frame.labels
+    rgb, depth_mm, labels = frame.rgb, frame.depth_mm, frame.labels
+    matrix = _matrix(change, *labels.shape)
+    size = (labels.shape[1], labels.shape[0])
+    if not change.has_depth:
+        depth_mm = np.zeros_like(depth_mm)
+    elif change.moves or change.late_px != (0.0, 0.0):
+        late = np.column_stack([np.zeros((2, 2)), change.late_px])
+        moved = cv2.warpAffine(depth_mm, matrix + late, size, flags=cv2.INTER_NEAREST, borderValue=0)
+        depth_mm = np.rint(np.minimum(moved / change.zoom, MOST_MM)).astype(np.uint16)
     if change.moves:
-        matrix = _matrix(change, *labels.shape)
-        size = (labels.shape[1], labels.shape[0])
         moved = cv2.warpAffine(rgb, matrix, size, flags=cv2.INTER_LINEAR, borderValue=(110, 110, 110))
         rgb = np.asarray(moved, np.uint8)
         labels = np.asarray(cv2.warpAffine(labels, matrix, size, flags=cv2.INTER_NEAREST, borderValue=0), np.uint8)
-    return LabelledFrame(rgb=_seen(rgb, change, rng), labels=labels, classes=frame.classes)
+    return LabelledFrame(rgb=_seen(rgb, change, rng), depth_mm=depth_mm, labels=labels, classes=frame.classes)
 
 
 def target_of(frame: LabelledFrame) -> Target:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import torch
 
+from dotmask.segmentation.yolact.design import COMPACT
 from scenarios.oracle import MIN_PIXELS
 from scenarios.registry import SCENARIOS
 from scenarios.segmenter_evaluation.report import CIRCUMSTANCES, SegmenterEvaluation
@@ -13,7 +14,7 @@ from sim.things.chairs import CHAIR_COLOURS
 from tools.doc_block import markdown_table
 from tools.segmenter_training import held_out, split
 from tools.segmenter_training.augmentation import LEAST_PX, MASK_SHARE
-from tools.segmenter_training.scenes import HEIGHT, WIDTH
+from tools.segmenter_training.frames import SENSOR_NAMES
 from tools.segmenter_training.state import AveragedWeights, Settings
 from tools.segmenter_training.training import LARGEST_GRADIENT, LAST_RATE, WARM_UP, WEIGHT_DECAY
 
@@ -60,14 +61,15 @@ def hardware(settings: Settings) -> str:
 def card(facts: Facts, on_held_out: SegmenterEvaluation, on_catalog: SegmenterEvaluation) -> str:
     """The card in Markdown."""
     s = facts.settings
-    frames, mask_px = s.scenes * s.frames_a_scene, f"{WIDTH // MASK_SHARE}x{HEIGHT // MASK_SHARE}"
+    frames, mask_px = s.scenes * s.frames_a_scene, f"{COMPACT.width // MASK_SHARE}x{COMPACT.height // MASK_SHARE}"
+    sensors = " or ".join(f"`{name}`" for name in SENSOR_NAMES)
     return f"""# `compact`: model card
 
 Written by `{facts.command}`; no figure here was typed by hand.
 
 YOLACT's design on a small backbone and with finer prototypes (`dotmask/segmentation/yolact`),
-{facts.values / 1e6:.2f} million values, for {_listed(split.CLASSES)}; images are stretched to
-{WIDTH}x{HEIGHT}. Weights: `compact.safetensors`,
+{facts.values / 1e6:.2f} million values, for {_listed(split.CLASSES)}; it is given colour and depth,
+stretched to {COMPACT.width}x{COMPACT.height}. Weights: `compact.safetensors`,
 {facts.size_bytes / 1e6:.1f} MB, float32, CC0-1.0, SHA-256
 `{facts.sha256}`.
 
@@ -76,12 +78,14 @@ For rendered scenarios. It has never seen a photograph: on recorded folders take
 ## Data
 
 {frames} frames of {s.scenes} random scenes, {s.frames_a_scene} each, rendered by the project's own simulator with the
-true masks; seed {s.seed}. Every frame draws who is there, doing what, where, and from where the camera looks: 0.2 to
-1.8 m high, mostly upright, often rolled up to 35 degrees, seldom at any angle. Every scene draws its room, furniture
-and lamps, the colours and patterns of clothes, skin, chairs, things and walls, the focal length and the exposure.
-While the network learns, frames are mirrored, zoomed, turned and shifted, their colours changed, blurred along a line
-and made noisy. To be found are all people, chairs, cups and bottles with at least {LEAST_PX} pixels of
-{WIDTH}x{HEIGHT}, cut or hidden as they are, those that belong to the furniture too.
+true masks, seen through {sensors}, and halved to {COMPACT.width}x{COMPACT.height}; seed {s.seed}.
+Every frame draws who is there, doing what, where, and from where the camera looks: 0.2 to 1.8 m high, mostly upright,
+often rolled up to 35 degrees, seldom at any angle. Every scene draws its room, furniture and lamps, the colours and
+patterns of clothes, skin, chairs, things and walls, the focal length and the exposure. While the network learns,
+frames are mirrored, zoomed, turned and shifted, their colours changed, blurred along a line and made noisy; the depth
+of some lies beside the colour, and some have none. To be found are all people, chairs, cups and bottles with at least
+{LEAST_PX} pixels of {COMPACT.width}x{COMPACT.height}, cut or hidden as they are, those that belong to the furniture
+too.
 
 {_split(s)}
 

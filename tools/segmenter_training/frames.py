@@ -1,26 +1,30 @@
-"""The frames of a training on disk, rendered once: colour, and which instance of a class each pixel shows.
+"""The frames of a training on disk, rendered once: colour, depth, and which instance of a class each pixel shows.
 
-A scene is three files: `00012.rgb.npy` (F, H, W, 3) uint8, `00012.labels.npy` (F, H, W) uint8, and `00012.json`, which
-is written last and names the class of each label. Label 0 is everything else.
+A scene is four files: `00012.rgb.npy` (F, H, W, 3) uint8, `00012.depth_mm.npy` (F, H, W) uint16,
+`00012.labels.npy` (F, H, W) uint8, and `00012.json`, which is written last and names the class of each label. Label 0
+is everything else.
 """
 
 import io
 import json
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from multiprocessing import get_context
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
 from dotmask.atomic_file import write_atomically
+from dotmask.segmentation.yolact.images import stretched
 from sim.randomness import child
 from sim.records import RenderedImages
 from sim.renderers.visibility_buffer import VisibilityBufferRenderer
+from sim.sensor.parameters import SENSORS
 from tools.segmenter_training.errors import TrainingError
 from tools.segmenter_training.scenes import TrainingScene, build_scene, draw_moment
 
@@ -30,6 +34,10 @@ TRIES = 4
 LEAST_SHOWN_PX = 40
 NEAREST_M = 0.3
 """A view is drawn again as well if a quarter of it is nearer: a shelf before the lens."""
+SENSOR_NAMES = ("kinect_v1", "realsense_d435")
+"""Each frame is taken through one of them."""
+MOST_MM = 65535
+IMAGES = ("rgb", "depth_mm", "labels")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -37,12 +45,14 @@ class LabelledFrame:
     """One frame.
 
     Attributes:
-        rgb: (H, W, 3) uint8, without noise.
+        rgb: (H, W, 3) uint8.
+        depth_mm: (H, W) uint16, millimetres, 0 = no return.
         labels: (H, W) uint8: 0, or the number of an instance.
         classes: class number of label 1, 2 and so on.
     """
 
     rgb: npt.NDArray[np.uint8]
+    depth_mm: npt.NDArray[np.uint16]
     labels: npt.NDArray[np.uint8]
     classes: tuple[int, ...]
 
@@ -58,15 +68,17 @@ def _frame(drawn: TrainingScene, renderer: VisibilityBufferRenderer, rng: np.ran
     ids = {actor.name: actor.instance_id for actor in drawn.scene.actors}
     for _ in range(TRIES):
         moment, target = draw_moment(drawn, rng)
-        images = renderer.render(moment)
+        images = renderer.render(moment, normals=True)
         is_shown = target is None or np.count_nonzero(images.instance_ids == ids[target]) >= LEAST_SHOWN_PX
         if is_shown and float(np.percentile(images.depth_m, 25)) > NEAREST_M:
             break
-    return labelled(images, drawn.classes)
+    sensor = SENSORS[SENSOR_NAMES[int(rng.integers(len(SENSOR_NAMES)))]].model
+    rgb, depth_m = sensor.measure(images, drawn.camera, int(rng.integers(2**31)), 0)
+    return halved(labelled(replace(images, rgb=rgb, depth_m=depth_m), drawn.classes))
 
 
 def labelled(images: RenderedImages, class_of_id: Mapping[int, int]) -> LabelledFrame:
-    """Perfect images as a frame of the training; labels follow the order of the instance ids.
+    """Images with their truth as a frame of the training; labels follow the order of the instance ids.
 
     Args:
         images: of any size.
@@ -78,8 +90,24 @@ def labelled(images: RenderedImages, class_of_id: Mapping[int, int]) -> Labelled
     table[known] = np.arange(1, len(known) + 1, dtype=np.uint8)
     return LabelledFrame(
         rgb=images.rgb,
+        depth_mm=np.rint(np.minimum(1e3 * images.depth_m, MOST_MM)).astype(np.uint16),
         labels=table[images.instance_ids],
         classes=tuple(class_of_id[number] for number in known),
+    )
+
+
+def halved(frame: LabelledFrame) -> LabelledFrame:
+    """A frame of half the height and width, colour and depth as the network is given them.
+
+    A pixel has the label of most of its four, and the largest of two that have two each.
+    """
+    height, width = (size // 2 for size in frame.labels.shape)
+    four = np.sort(frame.labels.reshape(height, 2, width, 2).transpose(0, 2, 1, 3).reshape(height, width, 4), axis=2)
+    return LabelledFrame(
+        rgb=np.asarray(cv2.resize(frame.rgb, (width, height), interpolation=cv2.INTER_AREA), np.uint8),
+        depth_mm=stretched(frame.depth_mm, height, width),
+        labels=np.where(four[..., 2] == four[..., 3], four[..., 2], four[..., 1]),
+        classes=frame.classes,
     )
 
 
@@ -115,8 +143,9 @@ class FrameStore:
             TrainingError: its scene was not rendered, or its files are damaged.
         """
         number, frame = divmod(index, self.frames_a_scene)
-        rgb, labels, classes = self._scene(number)
-        return LabelledFrame(rgb=np.asarray(rgb[frame]), labels=np.asarray(labels[frame]), classes=classes[frame])
+        *images, classes = self._scene(number)
+        rgb, depth_mm, labels = (np.asarray(image[frame]) for image in images)
+        return LabelledFrame(rgb=rgb, depth_mm=depth_mm, labels=labels, classes=classes[frame])
 
     def missing(self) -> list[int]:
         """The scenes that are not on disk yet."""
@@ -150,25 +179,25 @@ class FrameStore:
     def write(self, number: int, frames: Iterable[LabelledFrame]) -> None:
         """Put the frames of a scene on disk."""
         made = list(frames)
-        for name, arrays in (("rgb", [f.rgb for f in made]), ("labels", [f.labels for f in made])):
+        for name in IMAGES:
             buffer = io.BytesIO()
-            np.lib.format.write_array(buffer, np.stack(arrays), allow_pickle=False)
+            np.lib.format.write_array(buffer, np.stack([getattr(f, name) for f in made]), allow_pickle=False)
             write_atomically(self._path(number, f"{name}.npy"), buffer.getvalue())
         write_atomically(self._path(number, "json"), json.dumps({"classes": [f.classes for f in made]}) + "\n")
 
-    def _opened(self, number: int) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.uint8], list[tuple[int, ...]]]:
+    def _opened(self, number: int) -> tuple[Any, Any, Any, list[tuple[int, ...]]]:
+        """The images of a scene in the order of IMAGES, still on disk, and the classes of each frame."""
         try:
             told = json.loads(self._path(number, "json").read_text(encoding="utf-8"))["classes"]
-            rgb, labels = (
-                np.load(self._path(number, f"{name}.npy"), mmap_mode="r", allow_pickle=False)
-                for name in ("rgb", "labels")
+            rgb, depth_mm, labels = (
+                np.load(self._path(number, f"{name}.npy"), mmap_mode="r", allow_pickle=False) for name in IMAGES
             )
         except (OSError, EOFError, ValueError, KeyError) as error:
             raise TrainingError(
                 f"{self._path(number, 'json')}: scene {number} is missing or damaged ({error}); delete its files and "
                 "run the same command again"
             ) from error
-        return rgb, labels, [tuple(classes) for classes in told]
+        return rgb, depth_mm, labels, [tuple(classes) for classes in told]
 
     def _path(self, number: int, suffix: str) -> Path:
         return self._folder / f"{number:05d}.{suffix}"

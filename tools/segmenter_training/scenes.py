@@ -35,8 +35,8 @@ from tools.segmenter_training.places import Disc, Places, is_apart, rolled
 from tools.segmenter_training.split import CLASSES, SHARED_LOOKS, TRAINING_CHAIRS, TRAINING_CHARACTERS
 from tools.train_vocabulary.rooms import random_room
 
-WIDTH, HEIGHT = 320, 240
-"""What the network looks at."""
+WIDTH, HEIGHT = 640, 480
+"""What a camera delivers, and the judge shows."""
 PEOPLE, CHAIRS, CUPS, BOTTLES = 4, 3, 3, 3
 PERSON_RADIUS_M, CHAIR_RADIUS_M, SEATED_RADIUS_M = 0.28, 0.3, 0.45
 HIDDEN = pose(np.eye(3), [0.0, 0.0, -1000.0])
@@ -225,8 +225,8 @@ def _draw_thing(rng: np.random.Generator, name: str, kind: str, looks: tuple[str
 
 def _draw_camera(rng: np.random.Generator) -> CameraModel:
     """About the camera of fr3, wider or narrower."""
-    focal = 268.0 * math.exp(rng.uniform(math.log(0.85), math.log(1.25)))
-    u, v = rng.uniform(-6.0, 6.0, 2).tolist()
+    focal = 535.0 * math.exp(rng.uniform(math.log(0.85), math.log(1.25)))
+    u, v = rng.uniform(-12.0, 12.0, 2).tolist()
     return CameraModel(
         width=WIDTH,
         height=HEIGHT,

@@ -4,14 +4,13 @@ import csv
 import io
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Protocol
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 import torch
 from safetensors.torch import save
 from torch import Tensor
@@ -19,7 +18,7 @@ from torch import Tensor
 from dotmask.atomic_file import write_atomically
 from dotmask.segmentation.yolact.anchors import anchors_of
 from dotmask.segmentation.yolact.design import COMPACT, YolactDesign
-from dotmask.segmentation.yolact.images import MEAN_RGB, STD_RGB
+from dotmask.segmentation.yolact.images import MEAN_RGB, STD_RGB, depth_channel
 from dotmask.segmentation.yolact.loss import Losses, Target, yolact_loss
 from dotmask.segmentation.yolact.network import Answer, Yolact
 from sim.randomness import child
@@ -244,21 +243,23 @@ def _batches(
 def _batch(
     mine: Team, frames: Frames, settings: Settings, design: YolactDesign, step: int
 ) -> tuple[Tensor, list[Target]]:
-    """Images (B, 3, H, W) of this process's share of a step, normalised, and what is to be found in them."""
-    images, targets = [], []
+    """Images (B, 4, H, W) of this process's share of a step, normalised, and what is to be found in them."""
+    made, targets = [], []
     places = list(enumerate(frames_of_step(step, len(frames), settings)))
     for place, index in places[mine.rank :: len(mine)]:
         rng = child(settings.seed, "segmenter change", step * settings.batch + place)
         frame = changed(frames[index], draw_change(rng, design.height, design.width), rng)
-        images.append(frame.rgb)
+        made.append(frame)
         targets.append(target_of(frame))
-    return normalised(np.stack(images)), targets
+    return network_images(made), targets
 
 
-def normalised(images: npt.NDArray[np.uint8]) -> Tensor:
-    """Images (B, H, W, 3) of the network's size as `dotmask.segmentation.yolact.images.network_image` makes each."""
+def network_images(frames: Sequence[LabelledFrame]) -> Tensor:
+    """Frames of the network's size (B, 4, H, W) as `dotmask.segmentation.yolact.images.network_image` makes each."""
     mean, std = (torch.tensor(values) for values in (MEAN_RGB, STD_RGB))
-    return ((torch.from_numpy(images).float() - mean) / std).permute(0, 3, 1, 2)
+    colours = (torch.from_numpy(np.stack([frame.rgb for frame in frames])).float() - mean) / std
+    depths_m = torch.from_numpy(np.stack([frame.depth_mm for frame in frames]).astype(np.float32) / 1000)
+    return torch.cat([colours, depth_channel(depths_m[..., None])], dim=3).permute(0, 3, 1, 2)
 
 
 def _on(target: Target, device: torch.device) -> Target:

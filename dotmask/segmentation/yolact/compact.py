@@ -35,23 +35,25 @@ class BasicBlock(nn.Module):
 
 
 class CompactBackbone(nn.Module):
-    """Features at a half, a quarter, an eighth, a sixteenth and a thirty-second of the size."""
+    """Features at a half, a quarter, an eighth, a sixteenth and a thirty-second of the size.
+
+    Args:
+        channels_in: of the image.
+    """
 
     CHANNELS = (STEM, *(channels for channels, _ in STAGES))
     """Of C1 to C5."""
 
-    def __init__(self) -> None:
+    def __init__(self, channels_in: int) -> None:
         super().__init__()
         self.stem = nn.Sequential(
-            nn.Conv2d(3, STEM, 3, 2, padding=1, bias=False), nn.BatchNorm2d(STEM), nn.ReLU(inplace=True)
+            nn.Conv2d(channels_in, STEM, 3, 2, padding=1, bias=False), nn.BatchNorm2d(STEM), nn.ReLU(inplace=True)
         )
         self.stages = nn.ModuleList()
-        channels_in = STEM
-        for channels, blocks in STAGES:
-            made: list[nn.Module] = [BasicBlock(channels_in, channels, 2)]
+        for (channels, blocks), before in zip(STAGES, self.CHANNELS[:-1], strict=True):
+            made: list[nn.Module] = [BasicBlock(before, channels, 2)]
             made += [BasicBlock(channels, channels, 1) for _ in range(blocks - 1)]
             self.stages.append(nn.Sequential(*made))
-            channels_in = channels
 
     def forward(self, x: Tensor) -> list[Tensor]:
         """C1 to C5."""

@@ -23,6 +23,7 @@ class YolactDesign:
         has_square_anchors: whether an anchor's height is set to its width: a slip of the authors' program that the
             published YOLACT was trained with, and YOLACT++ was not.
         rescores_masks: whether a score is multiplied with the IoU that a small network expects of the mask (YOLACT++).
+        sees_depth: whether the network is given the depth image beside the colours.
         is_normalised: whether the convolutions behind the backbone are followed by group normalisation (Wu and He, ECCV
             2018). The published networks begin with a trained backbone and need none; in one that began with random
             weights, a quarter to two thirds of the channels of each of these layers fell silent.
@@ -39,8 +40,14 @@ class YolactDesign:
     aspect_ratios: tuple[float, ...] = (1.0, 0.5, 2.0)
     has_square_anchors: bool = False
     rescores_masks: bool = False
+    sees_depth: bool = False
     is_normalised: bool = False
     least_mask_px: int = 1
+
+    @property
+    def image_channels(self) -> int:
+        """Of what the network is given."""
+        return 4 if self.sees_depth else 3
 
     @property
     def anchors_a_cell(self) -> int:
@@ -90,6 +97,7 @@ COMPACT = YolactDesign(
     # So large beside the distance of the cells (8 to 128 px) that most objects have several anchors to learn from.
     scales_px=((18.0, 26.0), (36.0, 52.0), (72.0, 104.0), (144.0, 208.0), (256.0, 340.0)),
     aspect_ratios=(1.0, 0.4, 2.0),
+    sees_depth=True,
     is_normalised=True,
 )
 """A small network for two cores without a GPU, and for the paper's four classes alone."""

@@ -46,7 +46,7 @@ class Yolact(nn.Module):
         super().__init__()
         classes = len(design.class_names)
         self.backbone: ResNet50 | CompactBackbone = (
-            CompactBackbone()
+            CompactBackbone(design.image_channels)
             if design.backbone == "compact"
             else ResNet50(is_deformable=design.backbone == "resnet50_deformable")
         )
@@ -69,7 +69,7 @@ class Yolact(nn.Module):
         self.semantic_seg_conv = nn.Conv2d(design.channels, classes, 1)
 
     def forward(self, images: Tensor) -> Answer:
-        """The answer about images (B, 3, height, width), normalised as `dotmask.segmentation.yolact.images` does."""
+        """The answer about images (B, channels, height, width), as `dotmask.segmentation.yolact.images` makes them."""
         *finer, c3, c4, c5 = self.backbone(images)
         levels = self.fpn((c3, c4, c5))
         head = self.prediction_layers[0]

@@ -33,9 +33,7 @@ class YolactSegmenter:
         """See `dotmask.interfaces.Segmenter`: at most 100 instances with a score of at least 0.05."""
         height, width = frame.rgb.shape[:2]
         with torch.inference_mode():
-            found, masks = self._instances(
-                network_image(frame.rgb, self._design.height, self._design.width, self._device)
-            )
+            found, masks = self._instances(network_image(frame, self._design, self._device))
             best = found.scores >= LEAST_SCORE
             edges_px = found.boxes * found.boxes.new_tensor([width, height, width, height])
             whole, kept = stretched_above(
