@@ -63,7 +63,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--seed", type=int, default=0, help="of everything (0)")
     parser.add_argument("--scenes", type=int, default=720, help="random scenes that are rendered (720)")
     parser.add_argument("--frames-a-scene", type=int, default=FRAMES_A_SCENE, help=f"({FRAMES_A_SCENE})")
-    parser.add_argument("--steps", type=int, default=18000, help="of the optimiser (18000)")
+    parser.add_argument("--steps", type=int, default=12000, help="of the optimiser (12000)")
     parser.add_argument("--batch", type=int, default=16, help="images a step (16)")
     parser.add_argument("--rate", type=float, default=1e-3, help="largest learning rate (0.001)")
     parser.add_argument("--processes", type=int, default=2, help="that render and learn; threads of the test (2)")

@@ -122,7 +122,8 @@ medium and large are COCO's, by visible pixels: fewer than 1024, fewer than 9216
 
 ## Limits
 
-It knows the people, chairs, cups and bottles of this simulator alone. Masks have {mask_px} pixels: the rims of
+It knows the people, chairs, cups and bottles of this simulator alone. Where a camera gives no depth at all it finds
+much less: few frames of the training were so. Masks have {mask_px} pixels: the rims of
 small things are coarse. How often it misses what is small, far, rolled, cut or blurred is said above.
 """
 
