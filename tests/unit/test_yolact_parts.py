@@ -15,11 +15,12 @@ from dotmask.segmentation.yolact.anchors import anchors_of, decode
 from dotmask.segmentation.yolact.deformable import DeformableConv2d, deformable_conv2d
 from dotmask.segmentation.yolact.design import COMPACT, YOLACT, YOLACT_PLUS, YolactDesign
 from dotmask.segmentation.yolact.fast_nms import fast_nms
-from dotmask.segmentation.yolact.images import colour_channels, depth_channel, network_image, stretched
+from dotmask.segmentation.yolact.images import depth_channel, network_image, stretched
 from dotmask.segmentation.yolact.mask_kernels import stretched_above
 from dotmask.segmentation.yolact.masks import assemble
 
 torch.set_num_threads(1)
+CPU = torch.device("cpu")
 SIZES = {
     "yolact": ((69, 69), (35, 35), (18, 18), (9, 9), (5, 5)),
     "compact": ((30, 40), (15, 20), (8, 10), (4, 5), (2, 3)),
@@ -174,9 +175,15 @@ def test_masks_at_the_size_of_the_image() -> None:
         np.testing.assert_array_equal(kept, np.flatnonzero(large))
 
 
+def seen(rgb: np.ndarray, depth_m: np.ndarray) -> RgbdFrame:
+    """A frame of these images (11, 14)."""
+    camera = Intrinsics(width=14, height=11, fx=10.0, fy=10.0, cx=6.5, cy=5.0)
+    return RgbdFrame(index=0, timestamp_s=0.0, rgb=rgb, depth_m=depth_m, intrinsics=camera)
+
+
 def test_images_are_stretched_and_normalised() -> None:
     rgb = np.random.default_rng(5).integers(0, 256, (11, 14, 3), dtype=np.uint8)
-    image = colour_channels(rgb, 7, 19, torch.device("cpu"))
+    image = network_image(seen(rgb, np.zeros((11, 14), np.float32)), replace(YOLACT, height=7, width=19), CPU)
     assert image.shape == (1, 3, 7, 19)
     for channel, mean, std in ((0, 123.68, 58.40), (1, 116.78, 57.12), (2, 103.94, 57.38)):
         wanted = (slow_bilinear(rgb[..., channel].astype(float), 7, 19) - mean) / std
@@ -195,18 +202,11 @@ def test_depth_is_given_as_its_inverse_from_the_nearest_pixel() -> None:
             assert got[v, u] == depth_m[int(row), int(column)]
     told = depth_channel(torch.tensor([0.0, 0.5, 1.0, 2.5]))
     torch.testing.assert_close(told, torch.tensor([-0.4, 1.6, 0.6, 0.0]) / 0.3)
-    frame = RgbdFrame(
-        index=0,
-        timestamp_s=0.0,
-        rgb=rng.integers(0, 256, (11, 14, 3), dtype=np.uint8),
-        depth_m=depth_m,
-        intrinsics=Intrinsics(width=14, height=11, fx=10.0, fy=10.0, cx=6.5, cy=5.0),
-    )
-    device = torch.device("cpu")
-    image = network_image(frame, replace(COMPACT, height=22, width=7), device)
-    torch.testing.assert_close(image[:, :3], colour_channels(frame.rgb, 22, 7, device))
+    frame = seen(rng.integers(0, 256, (11, 14, 3), dtype=np.uint8), depth_m)
+    image = network_image(frame, replace(COMPACT, height=22, width=7), CPU)
+    torch.testing.assert_close(image[:, :3], network_image(frame, replace(YOLACT, height=22, width=7), CPU))
     torch.testing.assert_close(image[0, 3], depth_channel(torch.tensor(stretched(depth_m, 22, 7))))
-    assert network_image(frame, YOLACT, device).shape == (1, 3, 550, 550), "YOLACT knows colours alone"
+    assert network_image(frame, YOLACT, CPU).shape == (1, 3, 550, 550), "YOLACT knows colours alone"
 
 
 def slow_deformable(x, offsets, modulation, weight, bias, stride: int, padding: int) -> Tensor:

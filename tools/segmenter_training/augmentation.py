@@ -11,7 +11,7 @@ import torch
 
 from dotmask.segmentation.yolact.loss import Target
 from sim.randomness import child
-from tools.segmenter_training.frames import MOST_MM, LabelledFrame
+from tools.segmenter_training.frames import LabelledFrame, whole_mm
 
 LEAST_PX = 20
 """An instance with fewer pixels of the network's image is nothing to be found: the judge begins at 80 of 640x480."""
@@ -104,7 +104,7 @@ def changed(frame: LabelledFrame, change: Change, rng: np.random.Generator) -> L
     elif change.moves or change.late_px != (0.0, 0.0):
         late = np.column_stack([np.zeros((2, 2)), change.late_px])
         moved = cv2.warpAffine(depth_mm, matrix + late, size, flags=cv2.INTER_NEAREST, borderValue=0)
-        depth_mm = np.rint(np.minimum(moved / change.zoom, MOST_MM)).astype(np.uint16)
+        depth_mm = whole_mm(moved / change.zoom)
     if change.moves:
         moved = cv2.warpAffine(rgb, matrix, size, flags=cv2.INTER_LINEAR, borderValue=(110, 110, 110))
         rgb = np.asarray(moved, np.uint8)

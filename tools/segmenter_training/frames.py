@@ -36,7 +36,6 @@ NEAREST_M = 0.3
 """A view is drawn again as well if a quarter of it is nearer: a shelf before the lens."""
 SENSOR_NAMES = ("kinect_v1", "realsense_d435")
 """Each frame is taken through one of them."""
-MOST_MM = 65535
 IMAGES = ("rgb", "depth_mm", "labels")
 
 
@@ -90,10 +89,15 @@ def labelled(images: RenderedImages, class_of_id: Mapping[int, int]) -> Labelled
     table[known] = np.arange(1, len(known) + 1, dtype=np.uint8)
     return LabelledFrame(
         rgb=images.rgb,
-        depth_mm=np.rint(np.minimum(1e3 * images.depth_m, MOST_MM)).astype(np.uint16),
+        depth_mm=whole_mm(1e3 * images.depth_m),
         labels=table[images.instance_ids],
         classes=tuple(class_of_id[number] for number in known),
     )
+
+
+def whole_mm(depth_mm: npt.NDArray[np.floating]) -> npt.NDArray[np.uint16]:
+    """Depths of a frame, rounded; what is too far for 16 bits is as far as they reach."""
+    return np.rint(np.minimum(depth_mm, np.iinfo(np.uint16).max)).astype(np.uint16)
 
 
 def halved(frame: LabelledFrame) -> LabelledFrame:

@@ -18,7 +18,7 @@ from torch import Tensor
 from dotmask.atomic_file import write_atomically
 from dotmask.segmentation.yolact.anchors import anchors_of
 from dotmask.segmentation.yolact.design import COMPACT, YolactDesign
-from dotmask.segmentation.yolact.images import MEAN_RGB, STD_RGB, depth_channel
+from dotmask.segmentation.yolact.images import colour_channels, depth_channel
 from dotmask.segmentation.yolact.loss import Losses, Target, yolact_loss
 from dotmask.segmentation.yolact.network import Answer, Yolact
 from sim.randomness import child
@@ -256,10 +256,10 @@ def _batch(
 
 def network_images(frames: Sequence[LabelledFrame]) -> Tensor:
     """Frames of the network's size (B, 4, H, W) as `dotmask.segmentation.yolact.images.network_image` makes each."""
-    mean, std = (torch.tensor(values) for values in (MEAN_RGB, STD_RGB))
-    colours = (torch.from_numpy(np.stack([frame.rgb for frame in frames])).float() - mean) / std
+    colours = torch.from_numpy(np.stack([frame.rgb for frame in frames])).permute(0, 3, 1, 2).float()
     depths_m = torch.from_numpy(np.stack([frame.depth_mm for frame in frames]).astype(np.float32) / 1000)
-    return torch.cat([colours, depth_channel(depths_m[..., None])], dim=3).permute(0, 3, 1, 2)
+    images = torch.cat([colour_channels(colours), depth_channel(depths_m[:, None])], dim=1)
+    return images.contiguous(memory_format=torch.channels_last)
 
 
 def _on(target: Target, device: torch.device) -> Target:

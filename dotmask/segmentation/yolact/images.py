@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from dotmask.records import ColourImage, RgbdFrame
+from dotmask.records import RgbdFrame
 from dotmask.segmentation.yolact.design import YolactDesign
 
 Depth = TypeVar("Depth", bound=np.generic)
@@ -22,20 +22,20 @@ MEAN_NEARNESS, STD_NEARNESS = 0.4, 0.3
 
 
 def network_image(frame: RgbdFrame, design: YolactDesign, device: torch.device) -> Tensor:
-    """(1, channels, height, width) float32 of a frame, as large as the network wants it; depth comes after colour."""
-    colour = colour_channels(frame.rgb, design.height, design.width, device)
+    """(1, channels, height, width) float32 of a frame, stretched to the network's size; depth comes after colour."""
+    image = torch.tensor(frame.rgb, device=device).permute(2, 0, 1)[None].float()
+    image = functional.interpolate(image, (design.height, design.width), mode="bilinear", align_corners=False)
+    colour = colour_channels(image)
     if not design.sees_depth:
         return colour
     depth = torch.tensor(stretched(frame.depth_m, design.height, design.width), device=device)
     return torch.cat([colour, depth_channel(depth[None, None])], dim=1)
 
 
-def colour_channels(rgb: ColourImage, height: int, width: int, device: torch.device) -> Tensor:
-    """(1, 3, height, width) float32 of an image (H, W, 3): stretched bilinearly, then normalised by channel."""
-    image = torch.tensor(rgb, device=device).permute(2, 0, 1)[None].float()
-    image = functional.interpolate(image, (height, width), mode="bilinear", align_corners=False)
-    mean, std = (image.new_tensor(values)[:, None, None] for values in (MEAN_RGB, STD_RGB))
-    return (image - mean) / std
+def colour_channels(images: Tensor) -> Tensor:
+    """Grey levels (B, 3, height, width), float, as the network is given them: normalised by channel."""
+    mean, std = (images.new_tensor(values)[:, None, None] for values in (MEAN_RGB, STD_RGB))
+    return (images - mean) / std
 
 
 def stretched(depth: npt.NDArray[Depth], height: int, width: int) -> npt.NDArray[Depth]:
