@@ -15,6 +15,23 @@ from pycocotools.cocoeval import COCOeval
 from dotmask.records import Detections, MaskImage
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TrueMask:
+    """An instance of a class that is judged, in one image.
+
+    Attributes:
+        class_name: of the instance.
+        mask: (H, W).
+        counts: whether it is to be found; if not, finding it is not wrong either.
+        is_reasonable: whether it counts among the reasonable ones too.
+    """
+
+    class_name: str
+    mask: MaskImage
+    counts: bool
+    is_reasonable: bool
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Precision:
     """Average precision of one class; None where there is nothing to be found.
@@ -22,15 +39,19 @@ class Precision:
     Attributes:
         ap: mean over the IoU 0.5 to 0.95.
         ap50: at an IoU of 0.5.
+        ap50_reasonable: the same if the reasonable instances alone count.
         ap50_small, ap50_medium, ap50_large: the same of COCO's sizes: fewer than 32 x 32 visible pixels, than 96 x 96,
             and more.
+        reasonable: how many instances were.
     """
 
     ap: float | None
     ap50: float | None
+    ap50_reasonable: float | None
     ap50_small: float | None
     ap50_medium: float | None
     ap50_large: float | None
+    reasonable: int
 
 
 class AveragePrecision:
@@ -46,41 +67,50 @@ class AveragePrecision:
         self._true: list[dict[str, Any]] = []
         self._found: list[dict[str, Any]] = []
 
-    def see(self, size: tuple[int, int], true: Iterable[tuple[str, MaskImage, bool]], found: Detections) -> None:
+    def see(self, size: tuple[int, int], true: Iterable[TrueMask], found: Detections) -> None:
         """Add an image.
 
         Args:
             size: height and width.
-            true: class, mask (H, W) and whether it counts, of every instance of a class that is judged. One that does
-                not count is neither to be found nor is finding it wrong.
+            true: every instance of a class that is judged.
             found: of any class and score.
         """
         image = len(self._images) + 1
         self._images.append({"id": image, "height": size[0], "width": size[1]})
-        for class_name, mask, counts in true:
-            # COCO calls what does not count a crowd.
-            self._true.append(
-                self._annotation(image, class_name, mask, len(self._true) + 1) | {"iscrowd": int(not counts)}
-            )
+        for one in true:
+            annotation = self._annotation(image, one.class_name, one.mask, len(self._true) + 1)
+            self._true.append(annotation | {"counts": one.counts, "is_reasonable": one.counts and one.is_reasonable})
         for class_name, mask, score in zip(found.class_names, found.masks, found.scores.tolist(), strict=True):
             if class_name in self._numbers:
                 self._found.append(self._annotation(image, class_name, mask, len(self._found) + 1) | {"score": score})
 
     def by_class(self) -> dict[str, Precision]:
         """The figures of each class."""
-        with open(os.devnull, "w", encoding="utf-8") as nowhere, contextlib.redirect_stdout(nowhere):
-            evaluation = COCOeval(self._coco(self._true), self._coco(self._found), "segm")
-            evaluation.evaluate()
-            evaluation.accumulate()
-        # IoU, recall, class, area (all, small, medium, large), number of detections (the last is 100)
-        precision: npt.NDArray[np.float64] = evaluation.eval["precision"][..., -1]
+        precision, of_reasonable = (self._precision(that_counts) for that_counts in ("counts", "is_reasonable"))
         figures = {}
-        for n, name in enumerate(self._numbers):
+        for n, (name, number) in enumerate(self._numbers.items()):
             ap50, small, medium, large = (_mean(precision[0, :, n, area]) for area in range(4))
             figures[name] = Precision(
-                ap=_mean(precision[:, :, n, 0]), ap50=ap50, ap50_small=small, ap50_medium=medium, ap50_large=large
+                ap=_mean(precision[:, :, n, 0]),
+                ap50=ap50,
+                ap50_reasonable=_mean(of_reasonable[0, :, n, 0]),
+                ap50_small=small,
+                ap50_medium=medium,
+                ap50_large=large,
+                reasonable=sum(one["is_reasonable"] for one in self._true if one["category_id"] == number),
             )
         return figures
+
+    def _precision(self, that_counts: str) -> npt.NDArray[np.float64]:
+        """By IoU, recall, class and area (all, small, medium, large), if the true masks marked so count."""
+        # COCO calls what does not count a crowd.
+        true = [one | {"iscrowd": int(not one[that_counts])} for one in self._true]
+        with open(os.devnull, "w", encoding="utf-8") as nowhere, contextlib.redirect_stdout(nowhere):
+            evaluation = COCOeval(self._coco(true), self._coco(self._found), "segm")
+            evaluation.evaluate()
+            evaluation.accumulate()
+        precision: npt.NDArray[np.float64] = evaluation.eval["precision"][..., -1]  # of at most 100 detections
+        return precision
 
     def _annotation(self, image: int, class_name: str, mask: MaskImage, number: int) -> dict[str, Any]:
         return {

@@ -29,21 +29,26 @@ class ClassFigures(Part):
     Attributes:
         ap: COCO's average precision of the masks, mean over the IoU 0.5 to 0.95; null where there were none.
         ap50: the same at an IoU of 0.5.
+        ap50_reasonable: the same if the reasonable instances alone count: those that show at least 50 rows of pixels
+            and are hidden at most to 35 %; null where there were none.
         ap50_small, ap50_medium, ap50_large: the same of COCO's sizes, the bands of `misses["visible_px"]`; null where
             there were none.
         iou: mean over the matched masks; null without any.
         seen: instances that were to be found, over all frames.
+        reasonable: how many of them were.
         missed: those of them that no detection of the class overlaps with an IoU of 0.5.
         missed_share: of them.
     """
 
     ap: Measured
     ap50: Measured
+    ap50_reasonable: Measured
     ap50_small: Measured
     ap50_medium: Measured
     ap50_large: Measured
     iou: Measured
     seen: int
+    reasonable: int
     missed: int
     missed_share: Measured
 
@@ -114,9 +119,9 @@ def headline(evaluation: SegmenterEvaluation) -> str:
 
 def class_table(evaluation: SegmenterEvaluation) -> Table:
     """A row a class."""
-    drawn = _table("class", "AP", "AP50", "small", "medium", "large", "IoU", "seen", "missed, %")
+    drawn = _table("class", "AP", "AP50", "reasonable", "small", "medium", "large", "IoU", "seen", "missed, %")
     for name, f in evaluation.classes.items():
-        numbers = (f.ap, f.ap50, f.ap50_small, f.ap50_medium, f.ap50_large, f.iou)
+        numbers = (f.ap, f.ap50, f.ap50_reasonable, f.ap50_small, f.ap50_medium, f.ap50_large, f.iou)
         drawn.add_row(name, *(_number(value, 3) for value in numbers), str(f.seen), _percent(f.missed_share))
     return drawn
 

@@ -6,15 +6,21 @@ from dataclasses import asdict
 import numpy as np
 
 from dotmask.profiles import profile as get_profile
-from dotmask.records import MaskImage
 from dotmask.segmentation.networks import NetworkChoice
 from dotmask.segmentation.selection import select_detections
 from scenarios.bridge import rgbd_frame_from_sim
 from scenarios.errors import ScenarioError
 from scenarios.run import one_opencv_thread
-from scenarios.segmenter_evaluation.average_precision import AveragePrecision, Precision
+from scenarios.segmenter_evaluation.average_precision import AveragePrecision, Precision, TrueMask
 from scenarios.segmenter_evaluation.report import ClassFigures, Milliseconds, SegmenterEvaluation
-from scenarios.segmenter_evaluation.sightings import Sighting, band, misses, sightings_of, visible_actors
+from scenarios.segmenter_evaluation.sightings import (
+    Sighting,
+    band,
+    is_reasonable,
+    misses,
+    sightings_of,
+    visible_actors,
+)
 from scenarios.segmenters import load_segmenter, segmenter_report, segmenter_threads
 from scenarios.sources import Simulated
 from scenarios.spec import Scenario
@@ -99,18 +105,24 @@ def evaluate_segmenter(
     )
 
 
-def _true_masks(frame: SimFrame, scene: Scene, class_names: Sequence[str]) -> Iterator[tuple[str, MaskImage, bool]]:
-    """Class, mask and whether it counts, of all that is visible and of one of the classes.
+def _true_masks(frame: SimFrame, scene: Scene, class_names: Sequence[str]) -> Iterator[TrueMask]:
+    """All that is visible and of one of the classes.
 
     What counts are the actors that show enough pixels; furniture and specks do not.
     """
     ids = frame.truth.instance_ids
-    counting = {actor.instance_id for actor in visible_actors(frame.truth, class_names)}
+    counting = {actor.instance_id: actor for actor in visible_actors(frame.truth, class_names)}
     pixels = np.bincount(ids.ravel())
     for thing in scene.objects:
         number = thing.instance_id
         if thing.class_name in class_names and 0 < number < len(pixels) and pixels[number]:
-            yield thing.class_name, ids == number, number in counting
+            mask, actor = ids == number, counting.get(number)
+            yield TrueMask(
+                class_name=thing.class_name,
+                mask=mask,
+                counts=actor is not None,
+                is_reasonable=actor is not None and is_reasonable(actor, mask),
+            )
 
 
 def _figures(sightings: Sequence[Sighting], precision: Precision) -> ClassFigures:

@@ -8,7 +8,7 @@ import numpy as np
 
 from dotmask.evaluation.matching import mask_ious, match_detections
 from dotmask.geometry import inverse, project, transform
-from dotmask.records import Detections, FloatArray
+from dotmask.records import Detections, FloatArray, MaskImage
 from scenarios.bridge import intrinsics_from_camera
 from scenarios.faults.missing import roll_deg
 from scenarios.oracle import MIN_PIXELS
@@ -80,6 +80,24 @@ def sightings_of(
 def visible_actors(truth: GroundTruth, class_names: Sequence[str]) -> tuple[ObjectTruth, ...]:
     """The actors of the classes that show enough pixels to be found."""
     return tuple(a for a in truth.objects if a.class_name in class_names and a.visible_pixels >= MIN_PIXELS)
+
+
+REASONABLE_HEIGHT_PX, REASONABLE_OCCLUSION = 50, 0.35
+
+
+def is_reasonable(actor: ObjectTruth, mask: MaskImage) -> bool:
+    """Whether an actor is high enough and little enough hidden for the reasonable setting of pedestrian detection.
+
+    Dollár et al., Pedestrian detection: an evaluation of the state of the art, TPAMI 2012. Its height is that of the
+    whole person; here it is that of what is seen.
+
+    Args:
+        actor: in a frame.
+        mask: (H, W) its pixels there.
+    """
+    rows = np.flatnonzero(mask.any(axis=1))
+    height_px = int(rows[-1] - rows[0] + 1) if rows.size else 0
+    return height_px >= REASONABLE_HEIGHT_PX and actor.occlusion <= REASONABLE_OCCLUSION
 
 
 def _blur_px(actor: ObjectTruth, frame: SimFrame, simulator: Simulator) -> float:

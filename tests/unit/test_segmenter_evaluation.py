@@ -1,16 +1,16 @@
 """The figures of a segmenter: average precision by hand, circumstances in numbers, and the oracle, who knows all."""
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from dotmask.records import Detections
-from scenarios.segmenter_evaluation.average_precision import AveragePrecision, Precision
+from scenarios.segmenter_evaluation.average_precision import AveragePrecision, Precision, TrueMask
 from scenarios.segmenter_evaluation.report import Band
-from scenarios.segmenter_evaluation.sightings import Sighting, misses, sightings_of
+from scenarios.segmenter_evaluation.sightings import Sighting, is_reasonable, misses, sightings_of
 from sim.records import CameraModel, GroundTruth, Moment, ObjectTruth, SimFrame
 
 SIZE = (60, 100)
@@ -32,15 +32,21 @@ def detections(*found: tuple[str, np.ndarray, float]) -> Detections:
     )
 
 
-def precision_of(true: list[tuple[str, np.ndarray, bool]], *found: tuple[str, np.ndarray, float]) -> tuple:
+def person(image: np.ndarray, *, counts: bool = True, is_reasonable: bool = True) -> TrueMask:
+    return TrueMask(class_name="person", mask=image, counts=counts, is_reasonable=is_reasonable)
+
+
+def precision_of(true: list[TrueMask], *found: tuple[str, np.ndarray, float]) -> tuple:
     precision = AveragePrecision(("person", "chair"))
     precision.see(SIZE, true, detections(*found))
     by_class = precision.by_class()
-    assert by_class["chair"] == Precision(ap=None, ap50=None, ap50_small=None, ap50_medium=None, ap50_large=None)
+    assert by_class["chair"] == Precision(
+        ap=None, ap50=None, ap50_reasonable=None, ap50_small=None, ap50_medium=None, ap50_large=None, reasonable=0
+    )
     return by_class["person"].ap, by_class["person"].ap50
 
 
-ONE, TWO = [("person", mask(0), True)], [("person", mask(0), True), ("person", mask(50), True)]
+ONE, TWO = [person(mask(0))], [person(mask(0)), person(mask(50))]
 HALF = 51 / 101  # precision 1 at the recalls 0, 0.01, ..., 0.5
 
 AVERAGES = {
@@ -53,7 +59,7 @@ AVERAGES = {
     "a false one before": (precision_of(ONE, ("person", mask(0), 0.5), ("person", mask(60), 0.9)), (0.5, 0.5)),
     "a false one behind": (precision_of(ONE, ("person", mask(0), 0.5), ("person", mask(60), 0.4)), (1.0, 1.0)),
     "of the room": (
-        precision_of([*ONE, ("person", mask(60), False)], ("person", mask(0), 0.5), ("person", mask(60), 0.9)),
+        precision_of([*ONE, person(mask(60), counts=False)], ("person", mask(0), 0.5), ("person", mask(60), 0.9)),
         (1.0, 1.0),
     ),
     "nothing to find": (precision_of([], ("person", mask(0), 0.9)), (None, None)),
@@ -69,10 +75,32 @@ def test_average_precision_by_hand(case: str) -> None:
 def test_average_precision_by_size() -> None:
     small, medium = mask(0, 34), mask(50, 35)  # 1020 and 1050 pixels, about 32 x 32
     precision = AveragePrecision(("person",))
-    precision.see(SIZE, [("person", small, True), ("person", medium, True)], detections(("person", medium, 0.9)))
+    precision.see(SIZE, [person(small), person(medium)], detections(("person", medium, 0.9)))
     told = precision.by_class()["person"]
     assert (told.ap50, told.ap50_medium) == pytest.approx((HALF, 1.0))
     assert (told.ap50_small, told.ap50_large) == (0.0, None)
+
+
+def test_what_is_not_reasonable_is_neither_to_be_found_nor_wrong() -> None:
+    precision = AveragePrecision(("person",))
+    true = [person(mask(0)), person(mask(30), is_reasonable=False), person(mask(60), counts=False)]
+    found = detections(("person", mask(60), 0.9), ("person", mask(30), 0.8), ("person", mask(0), 0.7))
+    precision.see(SIZE, true, found)
+    precision.see(SIZE, [person(mask(0), is_reasonable=False)], detections())
+    told = precision.by_class()["person"]
+    assert told.ap50_reasonable == pytest.approx(1.0)
+    assert told.ap50 == pytest.approx(67 / 101), "two of three: precision 1 at the recalls 0, 0.01, ..., 0.66"
+    assert told.reasonable == 1
+
+
+@pytest.mark.parametrize(
+    ("rows", "occlusion", "wanted"), [(50, 0.35, True), (49, 0.35, False), (50, 0.36, False), (0, 0.0, False)]
+)
+def test_what_is_reasonable(rows: int, occlusion: float, wanted: bool) -> None:
+    (actor,) = seen(5).truth.objects
+    image = np.zeros(SIZE, np.bool_)
+    image[5 : 5 + rows, 40] = True
+    assert is_reasonable(replace(actor, occlusion=occlusion), image) is wanted
 
 
 @dataclass
@@ -201,9 +229,10 @@ def test_the_oracle_is_perfect_and_its_faults_are_not(dotmask) -> None:
         one = figures["classes"][name]
         assert (one["ap"], one["ap50"], one["iou"], one["missed"]) == (1.0, 1.0, 1.0, 0)
         assert one["seen"] > 0
+        assert (one["ap50_reasonable"], 0 < one["reasonable"] <= one["seen"]) == (1.0, True)
     assert figures["classes"]["cup"] == {
-        "ap": None, "ap50": None, "ap50_small": None, "ap50_medium": None, "ap50_large": None, "iou": None,
-        "seen": 0, "missed": 0, "missed_share": None,
+        "ap": None, "ap50": None, "ap50_reasonable": None, "ap50_small": None, "ap50_medium": None,
+        "ap50_large": None, "iou": None, "seen": 0, "reasonable": 0, "missed": 0, "missed_share": None,
     }  # fmt: skip
     assert figures["ms"]["median"] is None
     done = dotmask(*arguments, "--set", "faults.borders.pixels=-3", "--every", 21)
