@@ -1,4 +1,4 @@
-"""What a person can look at: a sheet of frames with their masks, and the loss over the steps."""
+"""What a person can look at: a sheet of frames with their masks and depth, and the loss over the steps."""
 
 import csv
 from collections.abc import Sequence
@@ -17,14 +17,14 @@ from tools.segmenter_training.state import Settings
 from tools.segmenter_training.training import LOSSES, Frames
 
 SHEET, CURVE = "frames.png", "losses.png"
-COLUMNS, ROWS = 6, 8
+COLUMNS, GROUPS = 6, 3
 COLOURS = ((235, 70, 60), (70, 150, 255), (70, 220, 90), (250, 210, 50))
 """Of person, chair, cup and bottle."""
 
 
 def write_sheet(frames: Frames, settings: Settings, path: Path) -> None:
-    """A PNG of frames spread over all, rows as rendered and as the network is taught with them by turns."""
-    chosen = np.linspace(0, len(frames) - 1, COLUMNS * ROWS // 2).round().astype(int).tolist()
+    """A PNG of frames spread over all: by turns a row as rendered, as the network is taught them, and of its depth."""
+    chosen = np.linspace(0, len(frames) - 1, COLUMNS * GROUPS).round().astype(int).tolist()
     rows: list[npt.NDArray[np.uint8]] = []
     for first in range(0, len(chosen), COLUMNS):
         plain = [frames[index] for index in chosen[first : first + COLUMNS]]
@@ -33,6 +33,7 @@ def write_sheet(frames: Frames, settings: Settings, path: Path) -> None:
             rng = child(settings.seed, "segmenter sheet", index)
             taught.append(changed(frame, draw_change(rng, *frame.labels.shape), rng))
         rows += [np.hstack([drawn(frame) for frame in group]) for group in (plain, taught)]
+        rows.append(np.hstack([depth_drawn(frame) for frame in taught]))
     _, encoded = cv2.imencode(".png", np.vstack(rows)[..., ::-1])
     write_atomically(path, encoded.tobytes())
 
@@ -46,6 +47,15 @@ def drawn(frame: LabelledFrame) -> npt.NDArray[np.uint8]:
         borders, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
         cv2.drawContours(image, borders, -1, COLOURS[class_index], 1)
     return image
+
+
+def depth_drawn(frame: LabelledFrame) -> npt.NDArray[np.uint8]:
+    """The inverse depth (H, W, 3) from blue, far, to red, half a metre and nearer; black without a return."""
+    depth_m = frame.depth_mm / 1000
+    nearness = np.where(depth_m > 0, 0.5 / np.maximum(depth_m, 0.5), 0.0)
+    image = cv2.applyColorMap((255 * nearness).round().astype(np.uint8), cv2.COLORMAP_TURBO)[..., ::-1]
+    image[depth_m == 0] = 0
+    return image.astype(np.uint8)
 
 
 def write_curve(folder: Path) -> None:
@@ -63,4 +73,4 @@ def write_curve(folder: Path) -> None:
         axes.set_xlabel("step")
         axes.set_ylabel("weighted loss")
         axes.grid(color=GREY, alpha=0.2)
-        axes.legend()
+        axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=len(header) - 1, frameon=False)
