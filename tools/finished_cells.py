@@ -8,17 +8,9 @@ from rich.console import Console
 from rich.progress import MofNCompleteColumn, Progress, TimeElapsedColumn, TimeRemainingColumn
 
 from scenarios.finished_runs import FinishedRuns
-from scenarios.registry import scenario
 from scenarios.report import Report
-from scenarios.spec import Scenario, with_overrides
 from scenarios.sweep.cells import Cell, CellResult, run_cell
 from scenarios.sweep.executors import cores, run_local
-
-
-def first_frames(name: str, frames: int | None) -> Scenario:
-    """A scenario, or its first frames."""
-    chosen = scenario(name)
-    return chosen if frames is None else with_overrides(chosen, {"frames": str(min(frames, chosen.frames))})
 
 
 def reports(cells: Sequence[Cell], out: Path) -> list[Report]:

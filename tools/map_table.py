@@ -12,13 +12,13 @@ from pathlib import Path
 
 from rich.progress import track
 
+from scenarios.registry import scenario
 from scenarios.report import MapReport
 from scenarios.run import RunSettings
-from scenarios.spec import with_overrides
+from scenarios.spec import first_frames, with_overrides
 from scenarios.sweep.cells import Cell, Done, run_and_keep
 from scenarios.sweep.executors import cores, run_local
 from tools.doc_block import figure, markdown_table, write_block
-from tools.finished_cells import first_frames
 
 PAGE = Path(__file__).parent.parent / "docs" / "mapping.md"
 PICTURE = PAGE.with_name("map.png")
@@ -41,7 +41,9 @@ def cell(name: str, frames: int | None, variant: str, methods: str) -> Cell:
     settings = RunSettings.parse(methods=methods, with_map=True, threads=1)
     varied = {"scenario": name, "variant": variant}
     return Cell(
-        scenario=with_overrides(first_frames(name, frames), {"variant": variant}), settings=settings, varied=varied
+        scenario=with_overrides(first_frames(scenario(name), frames), {"variant": variant}),
+        settings=settings,
+        varied=varied,
     )
 
 

@@ -11,12 +11,13 @@ What is finished is kept in runs/results: after an interruption the same command
 import argparse
 from pathlib import Path
 
-from scenarios.registry import SCENARIOS
+from scenarios.registry import SCENARIOS, scenario
 from scenarios.report import Report
 from scenarios.run import RunSettings
+from scenarios.spec import first_frames
 from scenarios.sweep.cells import Cell
 from tools.doc_block import figure, markdown_table, write_block
-from tools.finished_cells import first_frames, reports
+from tools.finished_cells import reports
 
 PAGE = Path(__file__).parent.parent / "README.md"
 HEADER = [
@@ -58,7 +59,9 @@ def main() -> None:
     options = parser.parse_args()
     names = options.names or [s.name for s in SCENARIOS.values() if "walking" in s.tags]
     settings = RunSettings.parse(methods="unmasked,dotmask", threads=1)
-    cells = [Cell(scenario=first_frames(name, options.frames), settings=settings, varied={}) for name in names]
+    cells = [
+        Cell(scenario=first_frames(scenario(name), options.frames), settings=settings, varied={}) for name in names
+    ]
     rows = [row(report) for report in reports(cells, Path("runs") / "results")]
     table = markdown_table(HEADER, rows)
     print(table)

@@ -12,11 +12,13 @@ What is finished is kept in runs/segmenter_table: after an interruption the same
 import argparse
 from pathlib import Path
 
+from scenarios.registry import scenario
 from scenarios.report import Report
 from scenarios.run import RunSettings
+from scenarios.spec import first_frames
 from scenarios.sweep.cells import Cell
 from tools.doc_block import figure, markdown_table, write_block
-from tools.finished_cells import first_frames, reports
+from tools.finished_cells import reports
 
 PAGE = Path(__file__).parent.parent / "docs" / "segmenters.md"
 NAMES = ("fr3_walking_static", "fr3_walking_xyz", "fr3_walking_rpy", "fr3_walking_halfsphere", "tilted")
@@ -72,7 +74,7 @@ def main() -> None:
         methods="unmasked,dotmask-oracle,dotmask", segmenter="compact", weights=options.weights, threads=1
     )
     cells = [
-        Cell(scenario=first_frames(name, options.frames), settings=settings, varied={})
+        Cell(scenario=first_frames(scenario(name), options.frames), settings=settings, varied={})
         for name in options.names or NAMES
     ]
     table = markdown_table(HEADER, [row(report) for report in reports(cells, Path("runs") / "segmenter_table")])

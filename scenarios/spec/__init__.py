@@ -36,7 +36,7 @@ from scenarios.spec.people import (
     WalkAct,
     WalkLoopAct,
 )
-from scenarios.spec.scenario import Scenario, scenario_from_json, with_overrides
+from scenarios.spec.scenario import Scenario, first_frames, scenario_from_json, with_overrides
 from scenarios.spec.sensor import SensorFailureSpec, SensorSpec
 from scenarios.spec.things import ImpulseSpec, ThingSpec
 
@@ -76,6 +76,7 @@ __all__ = [
     "TurnAct",
     "WalkAct",
     "WalkLoopAct",
+    "first_frames",
     "scenario_from_json",
     "with_overrides",
 ]

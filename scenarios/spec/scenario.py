@@ -141,6 +141,17 @@ def _walk(tree: Any, key: str) -> list[str]:
     return parts
 
 
+def first_frames(scenario: Scenario, frames: int | None) -> Scenario:
+    """`scenario` with no more than so many frames; as it is for None.
+
+    Raises:
+        ScenarioError: less than one frame.
+    """
+    if frames is None or frames >= scenario.frames:
+        return scenario
+    return with_overrides(scenario, {"frames": str(frames)})
+
+
 def with_overrides(scenario: Scenario, overrides: dict[str, str]) -> Scenario:
     """A copy of `scenario` with values replaced, checked as a whole.
 

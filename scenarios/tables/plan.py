@@ -7,7 +7,7 @@ from pathlib import Path
 from scenarios.registry import scenario
 from scenarios.run import METHODS as RUN_METHODS
 from scenarios.run import RunSettings
-from scenarios.spec import Scenario, with_overrides
+from scenarios.spec import Scenario, first_frames
 from scenarios.tables.paper import TABLE_II
 
 SEQUENCES = tuple(TABLE_II)
@@ -91,10 +91,7 @@ class TablePlan:
 
     def scenarios(self) -> tuple[Scenario, ...]:
         """The sequences, cut to their first frames where the plan says so."""
-        whole = [scenario(name) for name in self.sequences]
-        if self.frames is None:
-            return tuple(whole)
-        return tuple(with_overrides(one, {"frames": str(min(self.frames, one.frames))}) for one in whole)
+        return tuple(first_frames(scenario(name), self.frames) for name in self.sequences)
 
     def total_frames(self) -> int:
         """Frames of all runs."""

@@ -9,7 +9,7 @@ from scenarios.attribution.variants import ALL_TRUE, BASELINE
 from scenarios.counterfactual import METHODS, Triplet, run_triplet
 from scenarios.registry import scenario
 from scenarios.run import RunSettings
-from scenarios.spec import with_overrides
+from scenarios.spec import first_frames
 from scenarios.validation.section import Context, Section, markdown_table, number
 
 SCENARIO = "fr3_walking_xyz"
@@ -20,7 +20,7 @@ FRAMES, QUICK_FRAMES = 200, 20
 def write(context: Context) -> str:
     """See Section."""
     frames = QUICK_FRAMES if context.is_quick else FRAMES
-    shortened = with_overrides(scenario(SCENARIO), {"frames": str(frames)})
+    shortened = first_frames(scenario(SCENARIO), frames)
     parts = [
         f"`{SCENARIO}`, the first {frames} frames. Each stage of the method is replaced by the truth: alone (gain: "
         "what repairing it gains), and all but it (cost: what its errors alone cost). See docs/attribution.md."

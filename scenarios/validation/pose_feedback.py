@@ -2,7 +2,7 @@
 
 from dotmask.profiles import CALIBRATED
 from scenarios.registry import scenario
-from scenarios.spec import with_overrides
+from scenarios.spec import first_frames, with_overrides
 from scenarios.validation.runs import Contender, judged
 from scenarios.validation.section import Context, Section, markdown_table, number
 
@@ -17,7 +17,7 @@ def write(context: Context) -> str:
     }
     rows = []
     for speed in SPEEDS[1:] if context.is_quick else SPEEDS:
-        varied = with_overrides(context.runs.shortened(scenario(SCENARIO)), {"camera.speed": str(speed)})
+        varied = with_overrides(first_frames(scenario(SCENARIO), context.runs.frames), {"camera.speed": str(speed)})
         for feedback, m in judged(varied, contenders, context.advance).items():
             rows.append(
                 [

@@ -20,7 +20,7 @@ from scenarios.report import MethodReport
 from scenarios.run import METHODS, one_opencv_thread
 from scenarios.run_folder import RunFolder
 from scenarios.sources import rendered_ahead
-from scenarios.spec import Scenario, with_overrides
+from scenarios.spec import Scenario, first_frames
 from scenarios.world import build_simulator
 from sim.records import SimFrame
 from sim.simulator import Simulator
@@ -115,7 +115,8 @@ class Runs:
         """By scenario the report on each profile. Scenarios that differ in their faults alone are rendered once."""
         missing = [name for name in names if name not in self._reports]
         for rendered in dict.fromkeys(RENDERED_AS[name] for name in missing):
-            scenarios = [self.shortened(scenario_by_name(name)) for name in missing if RENDERED_AS[name] == rendered]
+            alike = [scenario_by_name(name) for name in missing if RENDERED_AS[name] == rendered]
+            scenarios = [first_frames(scenario, self.frames) for scenario in alike]
             contenders = {
                 f"{scenario.name}/{profile}": contender
                 for scenario in scenarios
@@ -125,7 +126,3 @@ class Runs:
             for scenario in scenarios:
                 self._reports[scenario.name] = {p.name: found[f"{scenario.name}/{p.name}"] for p in PROFILES}
         return {name: self._reports[name] for name in names}
-
-    def shortened(self, scenario: Scenario) -> Scenario:
-        """`scenario` with no more frames than are wanted."""
-        return with_overrides(scenario, {"frames": str(min(self.frames, scenario.frames))})

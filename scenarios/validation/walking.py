@@ -1,6 +1,7 @@
 """Errors of the filter on people and chairs, with what is bias of the measurement kept apart."""
 
 from scenarios.registry import scenario
+from scenarios.spec import first_frames
 from scenarios.validation.section import Context, Section, bounds, number
 from scenarios.validation.tables import reports_of, scenario_table
 from scenarios.validation.visible_velocity import STRIDE_S, table, visible_velocity
@@ -36,7 +37,7 @@ def write(context: Context) -> str:
             "steps errs by the latter, even if it knew the future:",
             table(
                 {
-                    name: visible_velocity(context.runs.shortened(scenario(name)), "person", context.advance)
+                    name: visible_velocity(first_frames(scenario(name), context.runs.frames), "person", context.advance)
                     for name in SCENARIOS
                 }
             ),

@@ -5,7 +5,7 @@ import pytest
 from scenarios.camera import camera_model
 from scenarios.errors import ScenarioError
 from scenarios.registry import SCENARIOS, scenario
-from scenarios.spec import PersonSpec, Scenario, StandAct, WalkLoopAct, scenario_from_json, with_overrides
+from scenarios.spec import PersonSpec, Scenario, StandAct, WalkLoopAct, first_frames, scenario_from_json, with_overrides
 
 
 def test_an_override_reaches_a_nested_value_and_leaves_the_original() -> None:
@@ -16,6 +16,14 @@ def test_an_override_reaches_a_nested_value_and_leaves_the_original() -> None:
     assert (
         with_overrides(varied, {"camera.speed": "1", "people.cast.1.acts.0.speed_m_s": "1.0", "frames": "60"}) == smoke
     )
+
+
+def test_first_frames() -> None:
+    smoke = scenario("smoke")
+    assert first_frames(smoke, 7) == with_overrides(smoke, {"frames": "7"})
+    assert first_frames(smoke, None) == first_frames(smoke, smoke.frames) == first_frames(smoke, 1000) == smoke
+    with pytest.raises(ScenarioError, match=r"frames: .*greater than or equal to 1"):
+        first_frames(smoke, 0)
 
 
 @pytest.mark.parametrize(
