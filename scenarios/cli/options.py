@@ -19,6 +19,9 @@ Overrides = Annotated[
 ]
 Seed = Annotated[int | None, typer.Option(help="Another seed for the office's looks and the sensor's noise.")]
 Frames = Annotated[int | None, typer.Option(help="Number of frames.")]
+Profile = Annotated[
+    str, typer.Option(help="Parameters of the method: paper, calibrated. original: as the authors' program is.")
+]
 Feedback = Annotated[
     str | None, typer.Option(help="Pose for the tracker: previous, constant_velocity, refined. Default: profile's.")
 ]
@@ -31,6 +34,7 @@ Segmenter = Annotated[
 Weights = Annotated[Path | None, typer.Option(metavar="FILE", help="Weights of a network: .pth or .safetensors.")]
 Device = Annotated[str | None, typer.Option(help="Where a network runs: cpu, cuda.", show_default="cpu")]
 Renderer = Annotated[str, typer.Option(help="Renderer: numba, pyrender.")]
+Slam = Annotated[str, typer.Option(help="SLAM back end: embedded, rtabmap.")]
 SlamParameters = Annotated[
     str | None, typer.Option(help="Parameters of RTAB-Map: default, refined.", show_default="default")
 ]

@@ -12,8 +12,10 @@ from scenarios.cli.options import (
     Frames,
     OptionalName,
     Overrides,
+    Profile,
     Renderer,
     Segmenter,
+    Slam,
     SlamParameters,
     SlamSet,
     Source,
@@ -25,13 +27,13 @@ from scenarios.errors import ScenarioError
 
 
 def tables(
-    slam: Annotated[str, typer.Option(help="SLAM back end: embedded, rtabmap.")] = "embedded",
+    slam: Slam = "embedded",
     slam_parameters: SlamParameters = None,
     slam_set: SlamSet = None,
     segmenter: Segmenter = "oracle",
     weights: Weights = None,
     device: Device = None,
-    profile: Annotated[str, typer.Option(help="Parameters of the method: paper, calibrated.")] = "calibrated",
+    profile: Profile = "calibrated",
     quick: Annotated[bool, typer.Option("--quick", help="The first 150 frames of each sequence.")] = False,
     repeat: Annotated[
         int | None,
@@ -155,11 +157,9 @@ def sweep(
     segmenter: Segmenter = "oracle",
     weights: Weights = None,
     device: Device = None,
-    slam: Annotated[str, typer.Option(help="SLAM back end: embedded, rtabmap.")] = "embedded",
+    slam: Slam = "embedded",
     slam_parameters: SlamParameters = None,
-    profile: Annotated[
-        str, typer.Option(help="Parameters of the method: paper, calibrated. original: as the authors' program is.")
-    ] = "calibrated",
+    profile: Profile = "calibrated",
     pose_feedback: Feedback = None,
     renderer: Renderer = "numba",
     frames: Frames = None,
