@@ -262,6 +262,18 @@ def test_scores_of_yolact_plus_are_multiplied_with_the_expected_iou() -> None:
     assert (found.masks.sum(axis=(1, 2)) >= 25).all()
 
 
+def test_scores_of_compact_are_multiplied_with_the_certainty_of_the_mask() -> None:
+    network = detecting(COMPACT, "cup")
+    head = network.prediction_layers[0]
+    for values in (head.mask_layer.weight, last_of_prototypes(network).weight):
+        torch.nn.init.zeros_(values)
+    torch.nn.init.constant_(head.mask_layer.bias, np.arctanh(2 / 3 / COMPACT.prototypes))
+    torch.nn.init.ones_(last_of_prototypes(network).bias)
+    found = YolactSegmenter(network, COMPACT, CPU).segment(frame(320, 240))
+    assert len(found) > 3
+    np.testing.assert_allclose(found.scores, 0.9 / (1 + np.exp(-2 / 3)), atol=1e-5)
+
+
 @pytest.mark.parametrize("design", [COMPACT, replace(YOLACT_PLUS, height=256, width=256)], ids=["compact", "yolact++"])
 def test_half_precision_as_on_a_gpu_finds_nearly_the_same(design: YolactDesign) -> None:
     network = detecting(design, "person")

@@ -16,7 +16,7 @@ from dotmask.segmentation.yolact.deformable import DeformableConv2d, deformable_
 from dotmask.segmentation.yolact.design import COMPACT, YOLACT, YOLACT_PLUS, YolactDesign
 from dotmask.segmentation.yolact.fast_nms import fast_nms
 from dotmask.segmentation.yolact.images import depth_channel, network_image, stretched
-from dotmask.segmentation.yolact.mask_kernels import stretched_above
+from dotmask.segmentation.yolact.mask_kernels import certainties, stretched_above
 from dotmask.segmentation.yolact.masks import assemble
 
 torch.set_num_threads(1)
@@ -155,6 +155,13 @@ def slow_bilinear(image: np.ndarray, height: int, width: int) -> np.ndarray:
         top = (1 - fx) * image[y0, x0] + fx * image[y0, x1]
         out[v, u] = (1 - fy) * top + fy * ((1 - fx) * image[y1, x0] + fx * image[y1, x1])
     return out
+
+
+def test_the_certainty_of_a_mask_is_the_mean_of_what_belongs_to_it() -> None:
+    soft = np.random.default_rng(4).random((4, 5, 7), np.float32)
+    soft[2] = np.minimum(soft[2], 0.5)
+    wanted = [soft[n][soft[n] > 0.5].mean() if n != 2 else 0.0 for n in range(4)]
+    np.testing.assert_allclose(certainties(soft, 0.5), wanted, rtol=1e-6)
 
 
 def test_masks_at_the_size_of_the_image() -> None:

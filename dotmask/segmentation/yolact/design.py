@@ -27,6 +27,8 @@ class YolactDesign:
         is_normalised: whether the convolutions behind the backbone are followed by group normalisation (Wu and He, ECCV
             2018). The published networks begin with a trained backbone and need none; in one that began with random
             weights, a quarter to two thirds of the channels of each of these layers fell silent.
+        weighs_certainty: whether a score is multiplied with the certainty of the mask, the mean of its values above one
+            half (Wang et al., SOLO: a simple framework for instance segmentation, TPAMI 2021).
         least_mask_px: masks with fewer pixels of the image are left out.
     """
 
@@ -42,6 +44,7 @@ class YolactDesign:
     rescores_masks: bool = False
     sees_depth: bool = False
     is_normalised: bool = False
+    weighs_certainty: bool = False
     least_mask_px: int = 1
 
     @property
@@ -99,5 +102,6 @@ COMPACT = YolactDesign(
     aspect_ratios=(1.0, 0.4, 2.0),
     sees_depth=True,
     is_normalised=True,
+    weighs_certainty=True,
 )
 """A small network for two cores without a GPU, and for the paper's four classes alone."""

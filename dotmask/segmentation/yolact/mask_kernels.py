@@ -1,10 +1,25 @@
-"""Stretching of masks to the size of the image. Compiled by numba."""
+"""Certainty of masks, and their stretching to the size of the image. Compiled by numba."""
 
 # mypy: ignore-errors
 # (numba infers the types of these functions from their arguments; numpy's own annotations do not describe them)
 
 import numpy as np
 from numba import njit
+
+
+@njit(cache=True, nogil=True)
+def certainties(masks, threshold):
+    """The mean (N,) float32 of what is above a threshold in each of the masks (N, h, w); 0 where nothing is."""
+    means = np.zeros(len(masks), np.float32)
+    for n in range(len(masks)):
+        total, count = 0.0, 0
+        for value in masks[n].flat:
+            if value > threshold:
+                total += value
+                count += 1
+        if count:
+            means[n] = total / count
+    return means
 
 
 @njit(cache=True, nogil=True)

@@ -9,7 +9,7 @@ from dotmask.segmentation.yolact.anchors import anchors_of, decode
 from dotmask.segmentation.yolact.design import YolactDesign
 from dotmask.segmentation.yolact.fast_nms import LEAST_SCORE, Detected, fast_nms
 from dotmask.segmentation.yolact.images import network_image
-from dotmask.segmentation.yolact.mask_kernels import stretched_above
+from dotmask.segmentation.yolact.mask_kernels import certainties, stretched_above
 from dotmask.segmentation.yolact.masks import THRESHOLD, assemble
 from dotmask.segmentation.yolact.network import Yolact
 
@@ -30,19 +30,19 @@ class YolactSegmenter:
         self._anchors = anchors_of(design).to(device)
 
     def segment(self, frame: RgbdFrame) -> Detections:
-        """See `dotmask.interfaces.Segmenter`: at most 100 instances with a score of at least 0.05."""
+        """See `dotmask.interfaces.Segmenter`: at most 100 instances, whose class scores at least 0.05."""
         height, width = frame.rgb.shape[:2]
         with torch.inference_mode():
-            found, masks = self._instances(network_image(frame, self._design, self._device))
-            best = found.scores >= LEAST_SCORE
+            found, soft_masks = self._instances(network_image(frame, self._design, self._device))
             edges_px = found.boxes * found.boxes.new_tensor([width, height, width, height])
-            whole, kept = stretched_above(
-                masks[best].cpu().numpy(), THRESHOLD, height, width, self._design.least_mask_px
+            edges, classes, scores, soft = (
+                part.cpu().numpy() for part in (edges_px, found.classes, found.scores, soft_masks)
             )
-            edges, classes, scores = (
-                part[best].cpu().numpy()[kept] for part in (edges_px, found.classes, found.scores)
-            )
-            return detections_from(whole, edges, [self._design.class_names[index] for index in classes], scores)
+            if self._design.weighs_certainty:
+                scores = scores * certainties(soft, THRESHOLD)
+            masks, kept = stretched_above(soft, THRESHOLD, height, width, self._design.least_mask_px)
+            names = [self._design.class_names[index] for index in classes[kept]]
+            return detections_from(masks, edges[kept], names, scores[kept])
 
     def _instances(self, image: Tensor) -> tuple[Detected, Tensor]:
         """Detections in an image, and their masks (N, h, w) in 0..1 at the size of the prototypes."""
@@ -50,6 +50,7 @@ class YolactSegmenter:
         # What follows is little work, and boxes need more than the eleven bits of float16.
         offsets, logits, coefficients, prototypes = (part[0].float() for part in answer[:4])
         found = fast_nms(decode(offsets, self._anchors), coefficients, torch.softmax(logits, dim=-1))
+        found = Detected(*(part[found.scores >= LEAST_SCORE] for part in found))
         masks = assemble(prototypes, found.coefficients, found.boxes)
         if self._network.maskiou_net is not None and len(masks):
             expected = self._network.maskiou_net(masks.to(self._type)).float()
