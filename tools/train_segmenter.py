@@ -63,7 +63,10 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--seed", type=int, default=0, help="of everything (0)")
     parser.add_argument("--scenes", type=int, default=720, help="random scenes that are rendered (720)")
     parser.add_argument("--frames-a-scene", type=int, default=FRAMES_A_SCENE, help=f"({FRAMES_A_SCENE})")
-    parser.add_argument("--steps", type=int, default=12000, help="of the optimiser (12000)")
+    parser.add_argument(
+        "--cycles", type=int, default=2, help="of the learning rate; a finished training can be given more (2)"
+    )
+    parser.add_argument("--steps", type=int, default=12000, help="of the optimiser in each cycle (12000)")
     parser.add_argument("--batch", type=int, default=16, help="images a step (16)")
     parser.add_argument("--rate", type=float, default=1e-3, help="largest learning rate (0.001)")
     parser.add_argument("--processes", type=int, default=2, help="that render and learn; threads of the test (2)")
@@ -77,7 +80,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--test", type=int, default=held_out.SCENARIOS, help="scenarios of the test (all)")
     parser.add_argument("--publish", action="store_true", help="put weights and card into assets/ at the end")
     args = parser.parse_args()
-    for name in ("scenes", "frames_a_scene", "steps", "batch", "processes", "test"):
+    for name in ("scenes", "frames_a_scene", "cycles", "steps", "batch", "processes", "test"):
         if getattr(args, name) < 1:
             parser.error(f"--{name.replace('_', '-')} must be at least 1")
     if args.batch < args.processes:
@@ -97,6 +100,7 @@ def _run(args: argparse.Namespace) -> None:
         seed=args.seed,
         scenes=args.scenes,
         frames_a_scene=args.frames_a_scene,
+        cycles=args.cycles,
         steps=args.steps,
         batch=args.batch,
         peak_rate=args.rate,
@@ -111,7 +115,7 @@ def _run(args: argparse.Namespace) -> None:
     if not (out / SHEET).exists():
         write_sheet(store, settings, out / SHEET)
     with progress_bar("steps", remembered_s=120.0) as progress:
-        task = progress.add_task("learn", total=settings.steps)
+        task = progress.add_task("learn", total=settings.all_steps)
         training_s = train(
             store,
             settings,
@@ -203,7 +207,7 @@ def _publish(out: Path, facts: Facts) -> None:
         WEIGHTS_OF_COMPACT,
         source="made by tools/train_segmenter",
         licence="CC0-1.0",
-        changes=f"trained for {settings.steps} steps of {settings.batch} images on "
+        changes=f"trained for {settings.all_steps} steps of {settings.batch} images on "
         f"{settings.scenes * settings.frames_a_scene} frames of random scenes, seed {settings.seed}; see compact.md",
     )
     print(f"{target}")

@@ -41,6 +41,7 @@ SETTINGS = Settings(
     seed=3,
     scenes=1,
     frames_a_scene=4,
+    cycles=1,
     steps=12,
     batch=2,
     peak_rate=2e-3,
@@ -288,6 +289,11 @@ def test_every_epoch_sees_every_frame_once_in_an_order_of_its_own() -> None:
     assert max(rates) == pytest.approx(SETTINGS.peak_rate)
     assert rates.index(max(rates)) in (4, 5)
     assert rates[-1] < 0.02 * SETTINGS.peak_rate
+    later = [learning_rate(step, replace(settings, steps=100, cycles=2)) for step in range(200)]
+    assert later[:100] == rates, "more cycles leave the first one as it was"
+    middle = SETTINGS.peak_rate * (1 + 0.01) / 2
+    assert [later[100], later[150]] == pytest.approx([SETTINGS.peak_rate, middle])
+    assert sorted(later[100:], reverse=True) == later[100:]
 
 
 def test_the_loss_falls_and_a_killed_training_ends_with_the_same_weights(
@@ -312,6 +318,22 @@ def test_the_loss_falls_and_a_killed_training_ends_with_the_same_weights(
     train(toys, settings, parts, save_every=20, advance=no_advance, design=DESIGN)
     assert (parts / WEIGHTS).read_bytes() == before, "a finished training has nothing left to do"
     assert all(tensor.isfinite().all() for tensor in load_file(parts / WEIGHTS).values())
+
+
+def test_a_finished_training_goes_on_with_another_cycle(toys: list[LabelledFrame], tmp_path: Path) -> None:
+    whole, parts = tmp_path / "whole", tmp_path / "parts"
+    twice = replace(SETTINGS, cycles=2)
+    for folder in (whole, parts):
+        folder.mkdir()
+    train(toys, twice, whole, save_every=5, advance=no_advance, design=DESIGN)
+    train(toys, SETTINGS, parts, save_every=5, advance=no_advance, design=DESIGN)
+    assert (parts / WEIGHTS).read_bytes() != (whole / WEIGHTS).read_bytes()
+    train(toys, twice, parts, save_every=5, advance=no_advance, design=DESIGN)
+    assert (parts / WEIGHTS).read_bytes() == (whole / WEIGHTS).read_bytes()
+    with pytest.raises(
+        TrainingError, match=r"with 24 steps, more than the 12 asked for; use more --cycles, or another"
+    ):
+        train(toys, SETTINGS, parts, save_every=5, advance=no_advance, design=DESIGN)
 
 
 def test_processes_share_a_training_and_go_on_where_they_were_killed(toys: list[LabelledFrame], tmp_path: Path) -> None:

@@ -24,7 +24,8 @@ class Settings:
         seed: of everything.
         scenes: that are rendered.
         frames_a_scene: of each.
-        steps: of the optimiser.
+        cycles: of the learning rate; they do not change what earlier ones did.
+        steps: of the optimiser in each cycle.
         batch: images a step.
         peak_rate: largest learning rate.
         processes: that share each batch.
@@ -35,12 +36,18 @@ class Settings:
     seed: int
     scenes: int
     frames_a_scene: int
+    cycles: int
     steps: int
     batch: int
     peak_rate: float
     processes: int
     device: str
     precision: str
+
+    @property
+    def all_steps(self) -> int:
+        """Steps of all cycles."""
+        return self.cycles * self.steps
 
 
 def write_state(
@@ -67,8 +74,10 @@ def write_state(
 def read_state(folder: Path, settings: Settings) -> tuple[int, float, dict[str, dict[str, Tensor]]] | None:
     """Steps done, wall time and tensors; None where there is no state yet.
 
+    The state of a training with fewer cycles is an earlier state of this one.
+
     Raises:
-        TrainingError: the file is damaged, or of a training with other settings.
+        TrainingError: the file is damaged, of a training with other settings, or of one with more steps.
     """
     from safetensors import SafetensorError, safe_open
 
@@ -87,13 +96,17 @@ def read_state(folder: Path, settings: Settings) -> tuple[int, float, dict[str, 
         raise TrainingError(
             f"{path}: is cut short or damaged ({error}); delete it to begin the training anew, the frames stay"
         ) from error
-    wanted = asdict(settings)
-    for name, value in wanted.items():
-        if written.get(name) != value:
+    for name, value in asdict(settings).items():
+        if name != "cycles" and written.get(name) != value:
             raise TrainingError(
                 f"{path}: is of a training with {name} {written.get(name)}, not {value}; use the same options, or "
                 "another --out"
             )
+    if step > settings.all_steps:
+        raise TrainingError(
+            f"{path}: is of a training with {step} steps, more than the {settings.all_steps} asked for; use more "
+            "--cycles, or another --out"
+        )
     return step, seconds, parts
 
 

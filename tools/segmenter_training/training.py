@@ -1,4 +1,4 @@
-"""The loop: batches of changed frames, the loss of YOLACT, AdamW with a warm-up and a cosine, averaged weights."""
+"""The loop: batches of changed frames, the loss of YOLACT, AdamW, cycles of the learning rate, averaged weights."""
 
 import csv
 import io
@@ -37,11 +37,11 @@ from tools.segmenter_training.team import Team, team
 
 WEIGHTS, LOSSES = "compact.safetensors", "losses.csv"
 WARM_UP = 0.05
-"""Share of the steps in which the learning rate grows."""
+"""Share of the first cycle in which the learning rate grows."""
 FIRST_FOUND = 0.02
 """At the beginning an anchor stands for something with this probability: else those without a box drown the others."""
 LAST_RATE = 0.01
-"""The learning rate at the end, as a share of the largest."""
+"""The learning rate at the end of a cycle, as a share of the largest."""
 WEIGHT_DECAY = 0.02
 LARGEST_GRADIENT = 10.0
 """Gradients with a larger norm are scaled down to it."""
@@ -62,11 +62,16 @@ class Frames(Protocol):
 
 
 def learning_rate(step: int, settings: Settings) -> float:
-    """Of step `step`, counted from 0: up along a line, down along a cosine."""
-    rising = max(1, round(WARM_UP * settings.steps))
-    if step < rising:
-        return settings.peak_rate * (step + 1) / rising
-    share = (step - rising) / max(1, settings.steps - rising)
+    """Of step `step`, counted from 0: once up along a line, and in each cycle down along a cosine.
+
+    Warm restarts after Loshchilov and Hutter, SGDR (ICLR 2017), equation 5: the second and later cycles begin with
+    the largest rate at once.
+    """
+    cycle, place = divmod(step, settings.steps)
+    rising = max(1, round(WARM_UP * settings.steps)) if cycle == 0 else 0
+    if place < rising:
+        return settings.peak_rate * (place + 1) / rising
+    share = (place - rising) / max(1, settings.steps - rising)
     return settings.peak_rate * (LAST_RATE + (1 - LAST_RATE) * (1 + math.cos(math.pi * share)) / 2)
 
 
@@ -108,7 +113,7 @@ def train(
     Raises:
         TrainingError: the state is damaged or of other settings, or the loss is no number any more.
     """
-    last = settings.steps if stop_after is None else min(stop_after, settings.steps)
+    last = settings.all_steps if stop_after is None else min(stop_after, settings.all_steps)
     values = sum(parameter.numel() for parameter in Yolact(design).parameters()) + len(Losses._fields)
     with team(settings.processes, values, _help, frames, settings, folder, design, last) as mine:
         return _learn(mine, frames, settings, folder, design, last, save_every, advance)
@@ -169,7 +174,7 @@ def _learn(
             rows.append([str(done), *(f"{mean:.5f}" for mean in (*means, sum(means)))])
             recent = []
         advance(1, f"loss {sum(told):.2f}")
-        if done % save_every == 0 or done == settings.steps:
+        if done % save_every == 0 or done == settings.all_steps:
             seconds = earlier_s + time.perf_counter() - start_s
             _write_losses(folder / LOSSES, rows)
             write_state(
@@ -183,7 +188,7 @@ def _learn(
                     "optimiser": optimiser_tensors(optimiser),
                 },
             )
-    if last == settings.steps and save_every is not None:
+    if last == settings.all_steps and save_every is not None:
         weights = {name: tensor.detach().cpu().contiguous() for name, tensor in averaged.tensors.items()}
         write_atomically(folder / WEIGHTS, save(weights))
     return earlier_s + time.perf_counter() - start_s if first < last else earlier_s
