@@ -149,7 +149,8 @@ def _mask_loss(prototypes: Tensor, coefficients: Tensor, target: Target, box: Te
     height, width = prototypes.shape[:2]
     wanted = _resized(target.masks, height, width)[box]
     logits = mask_logits(prototypes, coefficients)
-    counts = within_reach(target.boxes[box], height, width)
+    rows, columns = within_reach(target.boxes[box], height, width)
+    counts = rows & columns
     # Weights inside of the entropy: a third of the time of weighting what comes out of it.
     weights = scale * counts / counts.sum(dim=(1, 2), keepdim=True)
     return functional.binary_cross_entropy_with_logits(logits, wanted, weights, reduction="sum")

@@ -9,14 +9,21 @@ from numba import njit
 
 @njit(cache=True, nogil=True)
 def certainties(masks, threshold):
-    """The mean (N,) float32 of what is above a threshold in each of the masks (N, h, w); 0 where nothing is."""
+    """The mean (N,) float32 of what is above a threshold in each of the masks (N, h, w); 0 where nothing is.
+
+    Args:
+        masks: float32, at least 0.
+        threshold: at least 0.
+    """
     means = np.zeros(len(masks), np.float32)
     for n in range(len(masks)):
+        top, bottom, first, last = _extent(masks[n])
         total, count = 0.0, 0
-        for value in masks[n].flat:
-            if value > threshold:
-                total += value
-                count += 1
+        for i in range(top, bottom + 1):
+            for value in masks[n, i, first : last + 1]:
+                if value > threshold:
+                    total += value
+                    count += 1
         if count:
             means[n] = total / count
     return means
@@ -48,12 +55,7 @@ def stretched_above(masks, threshold, height, width, least_px):
     kept = np.empty(len(masks), np.intp)
     count = 0
     for n in range(len(masks)):
-        top, bottom, first, last = rows, -1, columns, -1
-        for i in range(rows):
-            for j in range(columns):
-                if masks[n, i, j] > 0:
-                    top, bottom = min(top, i), i
-                    first, last = min(first, j), max(last, j)
+        top, bottom, first, last = _extent(masks[n])
         if bottom < 0:
             continue
         begin, end = np.searchsorted(right, first), np.searchsorted(left, last + 1)
@@ -75,6 +77,27 @@ def stretched_above(masks, threshold, height, width, least_px):
         else:
             whole[count, start:stop, begin:end] = False
     return whole[:count], kept[:count]
+
+
+@njit(cache=True, nogil=True)
+def _extent(mask):
+    """First and last row, first and last column of a mask (h, w) that are not 0 all along; last ones -1 if all are."""
+    bits = mask.view(np.int32)  # of numbers that are at least 0, and integers are searched several at a time
+    rows, columns = bits.shape
+    in_column = np.zeros(columns, np.int32)
+    top, bottom = rows, -1
+    for i in range(rows):
+        in_row = np.int32(0)
+        for j in range(columns):
+            in_row |= bits[i, j]
+            in_column[j] |= bits[i, j]
+        if in_row != 0:
+            top, bottom = min(top, i), i
+    first, last = columns, -1
+    for j in range(columns):
+        if in_column[j] != 0:
+            first, last = min(first, j), j
+    return top, bottom, first, last
 
 
 @njit(cache=True, nogil=True)

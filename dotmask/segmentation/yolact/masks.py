@@ -18,8 +18,11 @@ def assemble(prototypes: Tensor, coefficients: Tensor, boxes: Tensor) -> Tensor:
         coefficients: (N, K).
         boxes: (N, 4) `x1, y1, x2, y2`, shares of the image.
     """
-    # In place: memory costs more here than arithmetic.
-    return mask_logits(prototypes, coefficients).sigmoid_().mul_(within_reach(boxes, *prototypes.shape[:2]))
+    masks = mask_logits(prototypes, coefficients).sigmoid_()
+    # In place, and side by side: memory costs more here than arithmetic.
+    for reach in within_reach(boxes, *prototypes.shape[:2]):
+        masks.mul_(reach.to(masks.dtype))
+    return masks
 
 
 def mask_logits(prototypes: Tensor, coefficients: Tensor) -> Tensor:
@@ -28,12 +31,14 @@ def mask_logits(prototypes: Tensor, coefficients: Tensor) -> Tensor:
     return (coefficients @ prototypes.flatten(0, 1).T).view(-1, height, width)
 
 
-def within_reach(boxes: Tensor, height: int, width: int) -> Tensor:
-    """(N, height, width) bool, where the mask of each box (N, 4) may be: inside of it, or `CROP_MARGIN_PX` beyond."""
+def within_reach(boxes: Tensor, height: int, width: int) -> tuple[Tensor, Tensor]:
+    """Rows (N, height, 1) and columns (N, 1, width), bool, where the mask of each box (N, 4) may be.
+
+    That is inside of the box, or `CROP_MARGIN_PX` beyond.
+    """
     x = torch.arange(width, device=boxes.device, dtype=boxes.dtype)
     y = torch.arange(height, device=boxes.device, dtype=boxes.dtype)
     left, top, right, bottom = (boxes * boxes.new_tensor([width, height, width, height])).T[:, :, None]
     in_columns = (x >= left - CROP_MARGIN_PX) & (x < right + CROP_MARGIN_PX)
     in_rows = (y >= top - CROP_MARGIN_PX) & (y < bottom + CROP_MARGIN_PX)
-    reach: Tensor = in_rows[:, :, None] & in_columns[:, None, :]
-    return reach
+    return in_rows[:, :, None], in_columns[:, None, :]
