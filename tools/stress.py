@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.progress import MofNCompleteColumn, Progress, TimeElapsedColumn, TimeRemainingColumn
 
 from scenarios.registry import scenario
-from scenarios.spec import Scenario, with_overrides
+from scenarios.spec import Scenario, first_frames
 from scenarios.sweep.cells import run_cell
 from scenarios.sweep.executors import cores, run_local
 from scenarios.sweep.figures import NOTE, told
@@ -102,7 +102,7 @@ def pictures(analysis: Analysis, folder: Path, prefix: str) -> str:
 
 def blocks(extent: Extent, out: Path, plots: Path) -> dict[str, str]:
     """Run everything; the blocks of the page by name."""
-    chosen = with_overrides(scenario(extent.scenario), {"frames": str(extent.frames)})
+    chosen = first_frames(scenario(extent.scenario), extent.frames)
     camera = camera_figures(chosen)
     feedback = ["pose_feedback=previous,refined", f"frame_rate_hz={extent.rates_hz}"]
     rates = measure(extent, chosen, [f"camera.speed={extent.speeds}", *feedback], out)

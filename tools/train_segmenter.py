@@ -26,7 +26,7 @@ from scenarios.cli.display import progress_bar
 from scenarios.errors import ScenarioError
 from scenarios.segmenter_evaluation.report import SegmenterEvaluation
 from scenarios.segmenter_evaluation.run import frames_of
-from scenarios.spec import Scenario
+from scenarios.spec import Scenario, first_frames
 from sim.errors import SimError
 from tools.asset_files import update_manifest
 from tools.segmenter_training import held_out
@@ -167,7 +167,7 @@ def _evaluations(out: Path, args: argparse.Namespace, facts: Facts) -> tuple[Seg
     test = tuple(held_out.held_out_scenario(number) for number in range(args.test))
     catalog = held_out.catalog_scenarios()
     if args.test < held_out.SCENARIOS:  # a trial: a few frames of the catalog will do
-        catalog = tuple(one.model_copy(update={"frames": 1}) for one in catalog[:1])
+        catalog = tuple(first_frames(one, 1) for one in catalog[:1])
     folder = out / "held_out"
     folder.mkdir(exist_ok=True)
     for scenario in test:
